@@ -1,0 +1,1 @@
+//! Distances between the arm and everything it must not touch, and the separation a person is owed.

@@ -1,0 +1,1 @@
+//! The fixed-rate loop: grid, clock, missed cycles, realtime set-up, allocation guard.

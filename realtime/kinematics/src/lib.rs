@@ -1,0 +1,1 @@
+//! Serial chains: forward kinematics, Jacobian, inverse kinematics.

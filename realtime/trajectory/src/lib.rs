@@ -1,0 +1,1 @@
+//! Jerk-limited online trajectory generation, from any state to any target state.
