@@ -1,1 +1,2 @@
 //! Tandem, the workcell controller.
+pub mod plant;
