@@ -2,6 +2,7 @@
 //!
 //! `data/*_fk.csv`: pinocchio 4.1.0 on the UR5 and Panda of the public package
 //! `example-robot-data` 6.0.0: joint positions, TCP pose, Jacobian in base axes.
+#![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
 
 use std::path::Path;
 

@@ -55,8 +55,9 @@ pub(super) fn solve(chain: &Chain, goal: &Isometry3<f64>, near: &[f64; JOINTS_MA
             best_manipulability = descent.manipulability;
         }
     }
+    // Would it be there without limits? Then they are the reason.
     for attempt in 0..4 {
-        let from = if attempt == 0 { start } else { scattered(chain, attempt, &start, true) };
+        let from = if attempt == 0 { *near } else { scattered(chain, attempt, near, false) };
         if descend(chain, goal, &from, false).residual < TOLERANCE {
             return Err(IkFailure::JointLimit);
         }
@@ -77,8 +78,7 @@ pub(super) fn polish(chain: &Chain, goal: &Isometry3<f64>, position: &mut [f64; 
         let (poses, jacobian) = chain.jacobian(position);
         let left = Chain::residual(&poses.base_from_tcp, goal);
         let norm = left.norm();
-        // Written so that what is not a number ends here as well.
-        if norm < EXACT || !(norm < residual) {
+        if norm < EXACT || norm >= residual || norm.is_nan() {
             residual = residual.min(norm);
             break;
         }
