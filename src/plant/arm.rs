@@ -166,13 +166,15 @@ impl Arm {
         let home = self.model.home;
         let count = self.joint_count();
         if let Some((multibody, _)) = self.joints.last().and_then(|&j| world.multibody_joints.get_mut(j)) {
+            // The first pass tells the multibody that its root is fixed; only then are its joints counted right.
+            multibody.forward_kinematics(&world.bodies, true);
             multibody.apply_displacements(&home[..count]);
             multibody.forward_kinematics(&world.bodies, true);
             multibody.update_rigid_bodies(&mut world.bodies, true);
         }
         self.drive(world, &home, &[0.0; JOINTS_MAX]);
+        self.measured.position = home;
         self.read(world, 1.0);
-        self.measured.velocity = [0.0; JOINTS_MAX];
     }
 
     /// How many joints move.
@@ -204,10 +206,11 @@ impl Arm {
 
     /// Reads joints and frames after a step of `dt` seconds.
     ///
-    /// The effort is what inverse dynamics asks of the motors for the motion
+    /// The velocity is how far the joints went: the engine's own differs from it by
+    /// what its solver takes back after each step. The effort is what inverse dynamics asks of the motors for the motion
     /// that was seen: the engine keeps no record of its motors' impulses.
     pub(super) fn read(&mut self, world: &PhysicsWorld, dt: f64) {
-        let before = self.measured.velocity;
+        let before = self.measured;
         let Some((multibody, _)) = self.joints.last().and_then(|&j| world.multibody_joints.get(j)) else { return };
         let mut motion = Motion::default();
         for (index, (&handle, model)) in self.joints.iter().zip(&self.model.joints).enumerate() {
@@ -215,8 +218,8 @@ impl Arm {
             let Some(link) = multibody.link(link_id) else { continue };
             let coordinates = link.joint.coords();
             motion.position[index] = coordinates[if model.prismatic { 0 } else { 3 }];
-            motion.velocity[index] = multibody.joint_velocity(link)[0];
-            motion.acceleration[index] = (motion.velocity[index] - before[index]) / dt;
+            motion.velocity[index] = (motion.position[index] - before.position[index]) / dt;
+            motion.acceleration[index] = (motion.velocity[index] - before.velocity[index]) / dt;
         }
         for (frame, &body) in self.base_from_link.iter_mut().zip(&self.bodies) {
             if let Some(body) = world.bodies.get(body) {

@@ -36,7 +36,8 @@ impl Glide {
             }
         } else {
             let wanted = speed.min((2.0 * BRAKING_SHARE * acceleration * distance).sqrt());
-            let change = way * (wanted / distance) - self.velocity;
+            let ahead = way.try_normalize(1e-12).unwrap_or_else(Vector3::zeros);
+            let change = ahead * wanted - self.velocity;
             self.velocity += change.cap_magnitude(acceleration * dt);
         }
         self.position += self.velocity * dt;

@@ -16,15 +16,14 @@
 
 use core::time::Duration;
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{ColliderBuilder, PhysicsWorld};
-use tandem_msg::{
-    Capsule, CellRequest, CellState, HumanState, JOINTS_MAX, JointCommand, JointState, OperatorEvent, Prompt, Stamp,
-};
+use tandem_config::Cell;
+use tandem_msg::{CellRequest, CellState, HumanState, JointCommand, JointState, OperatorEvent, Prompt, Stamp};
 
 mod arm;
 mod drive;
@@ -34,35 +33,24 @@ mod figure;
 mod frames;
 mod glide;
 mod human;
+mod model;
 mod parts;
 mod referee;
 mod station;
 mod tracker;
 
-use arm::{Arm, ArmModel, GRAVITY};
-use drive::Drive;
-use effector::{Effector, EffectorModel, Reach};
-use human::{Person, PersonModel, Sight};
-use parts::{PartModel, Parts};
-use referee::{ArmCapsule, Look, Obstacle, Referee};
-use station::{Feeder, FeederModel};
-use tracker::Tracker;
+#[cfg(test)]
+mod tests;
 
-/// Everything the plant is made of, in its own terms.
-pub(crate) struct PlantModel {
-    arm: ArmModel,
-    capsules: Vec<ArmCapsule>,
-    obstacles: Vec<Obstacle>,
-    effector: EffectorModel,
-    parts: Vec<PartModel>,
-    feeder: FeederModel,
-    person: PersonModel,
-    /// Standard deviations of a measured joint, rad, and of the tracked person, metres.
-    joint_noise: f64,
-    tracking_sigma: f64,
-    period: Duration,
-    config_hash: u64,
-}
+use arm::{Arm, GRAVITY};
+use drive::Drive;
+use effector::{Effector, Reach};
+use human::{Person, Sight};
+use model::PlantModel;
+use parts::Parts;
+use referee::{Look, Referee};
+use station::Feeder;
+use tracker::Tracker;
 
 /// What the plant hears in a cycle: the latest of each.
 pub struct PlantInputs<'a> {
@@ -108,8 +96,36 @@ pub struct Plant {
     base_from_tcp: Isometry3<f64>,
 }
 
+/// Why a plant cannot be built.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlantError {
+    /// The arm at rest stands in its own way or outside its limits.
+    #[error("{robot}: joint {joint} rests at {position} rad, allowed {min}..={max} rad; correct the resting position")]
+    HomeOutsideLimits {
+        /// Name of the arm.
+        robot: String,
+        /// Joint, counted from 0.
+        joint: usize,
+        /// Where it rests, rad.
+        position: f64,
+        /// Lower limit, rad.
+        min: f64,
+        /// Upper limit, rad.
+        max: f64,
+    },
+}
+
 impl Plant {
-    pub(crate) fn of(model: PlantModel, seed: u64) -> Self {
+    /// The hardware of a cell, standing still: arm at rest, tools in the rack, parts in the feeder.
+    ///
+    /// # Errors
+    /// An arm that cannot rest where its configuration says.
+    pub fn new(cell: &Cell, seed: u64) -> Result<Self, PlantError> {
+        let robot = model::robot(cell)?;
+        Ok(Self::of(PlantModel::of(cell, &robot), seed))
+    }
+
+    fn of(model: PlantModel, seed: u64) -> Self {
         let mut world = PhysicsWorld::new();
         world.gravity = Vector::new(0.0, 0.0, -GRAVITY);
         world.integration_parameters.dt = model.period.as_secs_f64();

@@ -7,9 +7,9 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, Normal};
 use rapier3d_f64::prelude::PhysicsWorld;
+use tandem_config::pose_of;
 use tandem_msg::{CellRequest, Pose, RequestKind, RequestPhase, Stamp};
 
-use super::frames::pose;
 use super::parts::{Parts, Place};
 
 /// Scans of a presented part per request. One is enough: the sample waits for whoever
@@ -143,7 +143,7 @@ impl Feeder {
         let upright = Isometry3::from_parts(station_from_part.translation, UnitQuaternion::identity());
         let jittered = upright * lies * upright.inverse() * station_from_part;
         parts.present(world, part, base_from_station * jittered);
-        self.base_from_station = pose(&base_from_station);
+        self.base_from_station = pose_of(&base_from_station);
         self.presented = Some(part);
         self.presentations += 1;
         self.presented_by = self.request.id;
