@@ -1,1 +1,3 @@
 //! Tandem, the workcell controller.
+pub mod strategy;
+pub mod supervisor;
