@@ -23,6 +23,7 @@
 
 mod error;
 mod instance;
+mod memory;
 mod node;
 mod publisher;
 mod reader;
@@ -30,6 +31,40 @@ mod wire;
 
 pub use error::{BusError, Intent};
 pub use instance::{Cleaned, Instance, Leftover, leftovers};
+pub use memory::{Slot, SlotReader, SlotWriter};
 pub use node::{Identity, Node};
 pub use publisher::{Publisher, Unsent};
 pub use reader::Latest;
+
+use tandem_msg::{Header, Message, Stamp};
+
+/// Writes one message type; the header is the bus's own work.
+///
+/// Implemented over shared memory ([`Publisher`]) and inside one process
+/// ([`SlotWriter`]); one set of tests holds for both.
+pub trait Write<M: Message> {
+    /// Publishes what `fill` writes. The header is set afterwards, whatever
+    /// `fill` does to it. What `fill` leaves alone keeps an unspecified value.
+    ///
+    /// # Errors
+    /// [`Unsent`] says whom it did not reach.
+    fn publish_with(&mut self, stamp: Stamp, fill: impl FnOnce(&mut M)) -> Result<Header, Unsent>;
+
+    /// Publishes a copy of `message`, but for its header.
+    ///
+    /// # Errors
+    /// As [`Write::publish_with`].
+    fn publish(&mut self, stamp: Stamp, message: &M) -> Result<Header, Unsent> {
+        self.publish_with(stamp, |slot| *slot = *message)
+    }
+}
+
+/// Reads the latest value of one message type.
+pub trait Read<M: Message> {
+    /// The latest value; a default one, whose header was never heard, before the first.
+    /// A value of an older incarnation, or an older one of the same, never replaces a newer.
+    fn read(&mut self) -> &M;
+
+    /// The value the last [`Read::read`] gave.
+    fn held(&self) -> &M;
+}

@@ -7,6 +7,7 @@ use iceoryx2::port::update_connections::UpdateConnections;
 use iceoryx2::prelude::ipc;
 use tandem_msg::{Header, Message, Stamp};
 
+use crate::Write;
 use crate::wire::Wire;
 
 /// Why a message was not published. The next cycle publishes anew; count it.
@@ -39,28 +40,13 @@ impl<M: Message> Publisher<M> {
     pub fn last(&self) -> &Header {
         &self.last
     }
+}
 
-    /// Publishes a copy of `message`, but for its header.
-    ///
-    /// # Errors
-    /// [`Unsent`] says whom it did not reach.
-    ///
-    /// # Realtime
-    /// As [`Self::publish_with`].
-    pub fn publish(&mut self, stamp: Stamp, message: &M) -> Result<Header, Unsent> {
-        self.publish_with(stamp, |slot| *slot = *message)
-    }
-
-    /// Publishes what `fill` writes, straight into shared memory: nothing is copied
-    /// afterwards. The header is set last, whatever `fill` does to it. What `fill`
-    /// leaves alone keeps an unspecified value.
-    ///
-    /// # Errors
-    /// [`Unsent`] says whom it did not reach.
-    ///
+impl<M: Message> Write<M> for Publisher<M> {
     /// # Realtime
     /// One small heap allocation by iceoryx2 0.10 for the loan; no system call unless a reader has come or gone.
-    pub fn publish_with(&mut self, stamp: Stamp, fill: impl FnOnce(&mut M)) -> Result<Header, Unsent> {
+    /// `fill` writes straight into shared memory: nothing is copied afterwards.
+    fn publish_with(&mut self, stamp: Stamp, fill: impl FnOnce(&mut M)) -> Result<Header, Unsent> {
         let mut loan = self.port.loan_uninit().map_err(|_| Unsent::NoSlot)?;
         let header = self.last.next(stamp);
         // SAFETY: the slot is mapped shared memory that this loan alone may write; it

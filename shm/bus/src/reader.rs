@@ -6,6 +6,7 @@ use iceoryx2::prelude::ipc;
 use iceoryx2::sample::Sample;
 use tandem_msg::{Header, Message};
 
+use crate::Read;
 use crate::wire::Wire;
 
 /// Writers of a service times its buffer, and one: no read takes in more than this.
@@ -36,13 +37,12 @@ impl<M: Message> Latest<M> {
     pub fn failures(&self) -> u64 {
         self.failures
     }
+}
 
-    /// The latest value; a default one, whose header was never heard, before the first.
-    /// A value of an older incarnation, or an older one of the same, never replaces a newer.
-    ///
+impl<M: Message> Read<M> for Latest<M> {
     /// # Realtime
     /// Never blocks and allocates nothing; no system call unless a writer has come or gone.
-    pub fn read(&mut self) -> &M {
+    fn read(&mut self) -> &M {
         for _ in 0..TAKEN_MAX {
             match self.port.receive() {
                 Ok(Some(sample)) => {
@@ -60,13 +60,12 @@ impl<M: Message> Latest<M> {
         self.held()
     }
 
-    /// The value the last [`Self::read`] gave.
-    pub fn held(&self) -> &M {
+    fn held(&self) -> &M {
         self.held.as_ref().map_or(&*self.never, |sample| &sample.payload().0)
     }
 }
 
 /// Whether a value that has just come in replaces the one that is held.
-fn newer(incoming: &Header, held: &Header) -> bool {
+pub(crate) fn newer(incoming: &Header, held: &Header) -> bool {
     (incoming.epoch, incoming.seq) > (held.epoch, held.seq) || !held.heard()
 }

@@ -1,16 +1,53 @@
-//! What holds on the bus, whoever speaks and whoever listens.
+//! What holds on every bus, in shared memory and inside one process.
 
-use tandem_bus::{Latest, Publisher};
+use tandem_bus::{Read, Slot, Write};
 use tandem_msg::{CLOUD_POINTS, Header, JointState, PointCloud, Stamp};
 
-use crate::{CONFIG_HASH, Scratch};
+use crate::{CONFIG_HASH, Scratch, identity};
 
-impl Scratch {
-    fn joints(&self, epoch: u64) -> Publisher<JointState> {
-        self.node("plant", epoch).publisher("arm/state").expect("a free service")
+/// A bus with one service of each message the suite needs.
+trait Fixture {
+    fn joints(&self, epoch: u64) -> impl Write<JointState>;
+    fn joints_reader(&self) -> impl Read<JointState>;
+    fn cloud(&self) -> impl Write<PointCloud>;
+    fn cloud_reader(&self) -> impl Read<PointCloud>;
+}
+
+struct InShared(Scratch);
+
+impl Fixture for InShared {
+    fn joints(&self, epoch: u64) -> impl Write<JointState> {
+        self.0.node("plant", epoch).publisher("arm/state").expect("a free service")
     }
-    fn joints_reader(&self) -> Latest<JointState> {
-        self.node("controller", 1).latest("arm/state").expect("a free service")
+    fn joints_reader(&self) -> impl Read<JointState> {
+        self.0.node("controller", 1).latest("arm/state").expect("a free service")
+    }
+    fn cloud(&self) -> impl Write<PointCloud> {
+        self.0.node("plant", 1).publisher("camera/cloud").expect("a free service")
+    }
+    fn cloud_reader(&self) -> impl Read<PointCloud> {
+        self.0.node("perception", 1).latest("camera/cloud").expect("a free service")
+    }
+}
+
+#[derive(Default)]
+struct InProcess {
+    joints: Slot<JointState>,
+    cloud: Slot<PointCloud>,
+}
+
+impl Fixture for InProcess {
+    fn joints(&self, epoch: u64) -> impl Write<JointState> {
+        self.joints.writer(&identity("plant", epoch))
+    }
+    fn joints_reader(&self) -> impl Read<JointState> {
+        self.joints.reader()
+    }
+    fn cloud(&self) -> impl Write<PointCloud> {
+        self.cloud.writer(&identity("plant", 1))
+    }
+    fn cloud_reader(&self) -> impl Read<PointCloud> {
+        self.cloud.reader()
     }
 }
 
@@ -19,9 +56,7 @@ fn at(position: f64) -> JointState {
 }
 
 /// Before the first value a reader sees one that was never heard, and does not wait.
-#[test]
-fn nothing_is_heard_before_the_first() {
-    let bus = Scratch::new();
+fn nothing_is_heard_before_the_first(bus: &impl Fixture) {
     let mut reader = bus.joints_reader();
     assert!(!reader.read().header.heard());
     let _writer = bus.joints(1);
@@ -29,9 +64,7 @@ fn nothing_is_heard_before_the_first() {
 }
 
 /// The header is the bus's: numbers from 1, the stamp given, epoch and configuration of the writer.
-#[test]
-fn the_bus_fills_the_header() {
-    let bus = Scratch::new();
+fn the_bus_fills_the_header(bus: &impl Fixture) {
     let (mut writer, mut reader) = (bus.joints(3), bus.joints_reader());
     let forged = JointState { header: Header { seq: 99, epoch: 99, ..Header::default() }, ..at(0.5) };
     for seq in 1..=3 {
@@ -43,9 +76,7 @@ fn the_bus_fills_the_header() {
 }
 
 /// A slow reader sees the last value only; a fast one sees it again.
-#[test]
-fn the_latest_value_is_all_there_is() {
-    let bus = Scratch::new();
+fn the_latest_value_is_all_there_is(bus: &impl Fixture) {
     let (mut writer, mut reader) = (bus.joints(1), bus.joints_reader());
     for k in 1..=1_000_u32 {
         writer.publish(Stamp(u64::from(k)), &at(f64::from(k))).expect("writers never wait for readers");
@@ -56,9 +87,7 @@ fn the_latest_value_is_all_there_is() {
 }
 
 /// Who comes late sees what was said last, once the writer has noticed the new reader.
-#[test]
-fn a_late_reader_hears_the_last_value() {
-    let bus = Scratch::new();
+fn a_late_reader_hears_the_last_value(bus: &impl Fixture) {
     let mut writer = bus.joints(1);
     writer.publish(Stamp(1), &at(1.0)).expect("a free slot");
     let mut reader = bus.joints_reader();
@@ -67,9 +96,7 @@ fn a_late_reader_hears_the_last_value() {
 }
 
 /// A restarted writer counts from 1 in a higher epoch and is believed; its predecessor no more.
-#[test]
-fn a_restarted_writer_is_believed_and_the_old_one_no_more() {
-    let bus = Scratch::new();
+fn a_restarted_writer_is_believed_and_the_old_one_no_more(bus: &impl Fixture) {
     let mut reader = bus.joints_reader();
     let mut old = bus.joints(1);
     for k in 1..=5 {
@@ -87,9 +114,7 @@ fn a_restarted_writer_is_believed_and_the_old_one_no_more() {
 }
 
 /// Two readers of one service do not take values from each other.
-#[test]
-fn readers_are_independent() {
-    let bus = Scratch::new();
+fn readers_are_independent(bus: &impl Fixture) {
     let (mut first, mut second) = (bus.joints_reader(), bus.joints_reader());
     let mut writer = bus.joints(1);
     writer.publish(Stamp(1), &at(1.0)).expect("a free slot");
@@ -98,12 +123,8 @@ fn readers_are_independent() {
 }
 
 /// A cloud is written in place, point by point, and arrives whole.
-#[test]
-fn a_cloud_is_written_in_place() {
-    let bus = Scratch::new();
-    let node = bus.node("plant", 1);
-    let mut writer = node.publisher::<PointCloud>("camera/cloud").expect("a free service");
-    let mut reader = node.latest::<PointCloud>("camera/cloud").expect("a free service");
+fn a_cloud_is_written_in_place(bus: &impl Fixture) {
+    let (mut writer, mut reader) = (bus.cloud(), bus.cloud_reader());
     for round in 1..=10_u16 {
         let value = f32::from(round);
         writer
@@ -117,4 +138,24 @@ fn a_cloud_is_written_in_place() {
         assert_eq!((cloud.request, cloud.header.seq), (u32::from(round), u64::from(round)));
         assert!(cloud.points.iter().all(|point| *point == [value; 3]), "round {round}");
     }
+}
+
+fn conforms<B: Fixture>(fresh: impl Fn() -> B) {
+    nothing_is_heard_before_the_first(&fresh());
+    the_bus_fills_the_header(&fresh());
+    the_latest_value_is_all_there_is(&fresh());
+    a_late_reader_hears_the_last_value(&fresh());
+    a_restarted_writer_is_believed_and_the_old_one_no_more(&fresh());
+    readers_are_independent(&fresh());
+    a_cloud_is_written_in_place(&fresh());
+}
+
+#[test]
+fn shared_memory_conforms() {
+    conforms(|| InShared(Scratch::new()));
+}
+
+#[test]
+fn one_process_conforms() {
+    conforms(InProcess::default);
 }

@@ -6,7 +6,7 @@ use std::io::{BufRead, BufReader, Write as _};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 
-use tandem_bus::{Cleaned, Instance, Node, leftovers};
+use tandem_bus::{Cleaned, Instance, Node, Read, Write, leftovers};
 use tandem_msg::{JointState, Stamp};
 
 use crate::{PATIENCE, Scratch, identity, root};

@@ -1,6 +1,6 @@
 //! Two cells side by side, peers that do not belong, and what must not be found.
 
-use tandem_bus::{BusError, Identity, Node};
+use tandem_bus::{BusError, Identity, Node, Read, Write};
 use tandem_msg::{JointCommand, JointState, Stamp};
 
 use crate::{PATIENCE, Scratch, identity};

@@ -1,4 +1,4 @@
-//! The bus as its users see it: in order, beside strangers, and after a crash.
+//! The bus as its users see it: one suite for both kinds, then what only shared memory can get wrong.
 
 mod conformance;
 mod crash;
