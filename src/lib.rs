@@ -1,1 +1,5 @@
 //! Tandem, the workcell controller.
+
+pub mod learning;
+pub mod perception;
+pub mod plant;
