@@ -3,12 +3,13 @@
 use nalgebra::Isometry3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
+use tandem_config::FeatureGeometry;
 use tandem_msg::{CLOUD_POINTS, Coded, FeatureClass};
 
 use super::specimen::Specimen;
 use crate::perception::{Sample, Sampler};
 use crate::plant::camera::View;
-use crate::plant::solid::{FeatureGeometry, Material};
+use crate::plant::solid::Material;
 
 /// Which of the disjoint sets an example belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,11 +1,13 @@
 //! Training of the encoder and both decoders on generated parts.
 //!
-//! [`specimen`] draws parts and views, [`dataset`] scans them with the plant's depth
-//! camera and samples the clouds exactly as perception does, [`train`] fits the network,
-//! [`report`] measures it on parts it never saw.
+//! [`Specimen`] draws parts and views, [`example`] scans them with the plant's depth
+//! camera and samples the clouds exactly as perception does, [`train`] fits the network
+//! and measures it on parts it never saw.
 
 mod adam;
+mod augment;
 mod dataset;
+mod loss;
 mod parameters;
 mod report;
 mod specimen;

@@ -2,7 +2,7 @@
 
 use nalgebra::Isometry3;
 
-use super::geometry::Body;
+use tandem_config::Body;
 
 /// A body, evaluated at points of the feature frame.
 #[derive(Clone, Debug)]

@@ -1,10 +1,10 @@
 //! Signed distances of the eight feature classes, and how each joins its body.
 
+use tandem_config::FeatureGeometry;
 use tandem_msg::FeatureClass;
 
 use super::Material;
 use super::body::{cuboid, extrude};
-use super::geometry::FeatureGeometry;
 use super::thread::Thread;
 
 /// 1/√2: the slope of a chamfer.

@@ -11,15 +11,14 @@
 
 mod body;
 mod feature;
-mod geometry;
 mod surroundings;
 mod thread;
 
 pub use feature::{FeatureSolid, Form, Other};
-pub use geometry::{Body, FeatureGeometry};
 pub use surroundings::{Clutter, Surroundings};
 
 use nalgebra::Isometry3;
+use tandem_config::{Body, FeatureGeometry};
 
 use body::BodySolid;
 
