@@ -26,6 +26,7 @@ use tandem_config::Cell;
 use tandem_msg::{CellRequest, CellState, HumanState, JointCommand, JointState, OperatorEvent, Prompt, Stamp};
 
 mod arm;
+pub mod camera;
 mod drive;
 mod dynamics;
 mod effector;
@@ -36,6 +37,7 @@ mod human;
 mod model;
 mod parts;
 mod referee;
+pub mod solid;
 mod station;
 mod tracker;
 
