@@ -1,1 +1,43 @@
 //! The files of a cell, read and checked: TOML, URDF and JSON become values nobody else can build.
+//!
+//! [`Cell::load`] reads every file a cell names, checks every value against the
+//! one place its bounds are declared, and answers with either a whole cell or all
+//! the [`Faults`] of all files at once, each with file, line, column, the value
+//! found, what is allowed and what to do.
+//!
+//! **Invariant:** past `load` nothing here reads a file, and nothing a role asks of
+//! a cell can be missing, out of range or not finite.
+//!
+//! Frames are written `a_from_b`. A TCP's z axis is the direction in which the tool
+//! approaches; part, station and fixture frames have z up. SI units, radians.
+
+mod body;
+mod camera;
+mod cell;
+mod fault;
+mod human;
+mod layout;
+mod perception;
+mod plant;
+mod pose;
+mod product;
+mod read;
+mod strategy;
+mod supervisor;
+mod timing;
+
+pub use body::{Body, Cuboid, FeatureGeometry};
+pub use camera::Camera;
+pub use cell::{Cell, Store};
+pub use fault::{Fault, Faults};
+pub use human::Human;
+pub use layout::{FixedObject, Layout, RackSlot, Station, id};
+pub use perception::Perception;
+pub use plant::Plant;
+pub use pose::{isometry_of, pose_of};
+pub use product::{Capture, Part, Product};
+pub use strategy::{
+    AssemblyMode, Focus, Form, Range, ReferenceRow, Step, StrategyRow, Subject, Verb,
+};
+pub use supervisor::{Capability, Supervisor, Timeouts};
+pub use timing::{Policy, Realtime, Schedule, Timing};

@@ -119,30 +119,13 @@ impl fmt::Display for ChainError {
         match *self {
             Self::Empty => write!(f, "the chain has no moving joint, allowed 1..={JOINTS_MAX}"),
             Self::TooManyJoints { count } => {
-                write!(
-                    f,
-                    "the chain has {count} moving joints, allowed 1..={JOINTS_MAX}; fix some of them"
-                )
+                write!(f, "the chain has {count} moving joints, allowed 1..={JOINTS_MAX}; fix some of them")
             }
-            Self::NotFinite { joint } => write!(
-                f,
-                "joint {joint}: a pose, axis or limit is not a finite number"
-            ),
-            Self::InvertedLimits {
-                joint,
-                position_min,
-                position_max,
-            } => {
-                write!(
-                    f,
-                    "joint {joint}: position_min = {position_min} is above position_max = {position_max}"
-                )
+            Self::NotFinite { joint } => write!(f, "joint {joint}: a pose, axis or limit is not a finite number"),
+            Self::InvertedLimits { joint, position_min, position_max } => {
+                write!(f, "joint {joint}: position_min = {position_min} is above position_max = {position_max}")
             }
-            Self::NotPositive {
-                joint,
-                limit,
-                value,
-            } => {
+            Self::NotPositive { joint, limit, value } => {
                 write!(f, "joint {joint}: {limit} = {value}, allowed above 0")
             }
         }
@@ -198,18 +181,14 @@ impl Chain {
             return Err(ChainError::Empty);
         }
         if joints.len() > JOINTS_MAX {
-            return Err(ChainError::TooManyJoints {
-                count: joints.len(),
-            });
+            return Err(ChainError::TooManyJoints { count: joints.len() });
         }
         let mut slots = [Joint::UNUSED(); JOINTS_MAX];
         for (index, (slot, joint)) in slots.iter_mut().zip(joints).enumerate() {
             *slot = checked(index, joint)?;
         }
         if !is_finite(&tool) {
-            return Err(ChainError::NotFinite {
-                joint: joints.len(),
-            });
+            return Err(ChainError::NotFinite { joint: joints.len() });
         }
         let mut chain = Self {
             joints: slots,
@@ -256,23 +235,12 @@ fn checked(index: usize, joint: &Joint) -> Result<Joint, ChainError> {
         joint.effort_max,
     ];
     let axis_is_unit = (joint.axis.norm() - 1.0).abs() < 1e-6;
-    if !numbers.iter().all(|x| x.is_finite())
-        || !is_finite(&joint.parent_from_joint)
-        || !axis_is_unit
-    {
+    if !numbers.iter().all(|x| x.is_finite()) || !is_finite(&joint.parent_from_joint) || !axis_is_unit {
         return Err(ChainError::NotFinite { joint: index });
     }
     if joint.position_min > joint.position_max {
-        let Joint {
-            position_min,
-            position_max,
-            ..
-        } = *joint;
-        return Err(ChainError::InvertedLimits {
-            joint: index,
-            position_min,
-            position_max,
-        });
+        let Joint { position_min, position_max, .. } = *joint;
+        return Err(ChainError::InvertedLimits { joint: index, position_min, position_max });
     }
     let limits = [
         ("velocity_max", joint.velocity_max),
@@ -282,11 +250,7 @@ fn checked(index: usize, joint: &Joint) -> Result<Joint, ChainError> {
     ];
     for (limit, value) in limits {
         if value <= 0.0 {
-            return Err(ChainError::NotPositive {
-                joint: index,
-                limit,
-                value,
-            });
+            return Err(ChainError::NotPositive { joint: index, limit, value });
         }
     }
     Ok(*joint)
@@ -294,8 +258,7 @@ fn checked(index: usize, joint: &Joint) -> Result<Joint, ChainError> {
 
 /// Whether a pose holds finite numbers only.
 pub(crate) fn is_finite(pose: &Isometry3<f64>) -> bool {
-    pose.translation.vector.iter().all(|x| x.is_finite())
-        && pose.rotation.coords.iter().all(|x| x.is_finite())
+    pose.translation.vector.iter().all(|x| x.is_finite()) && pose.rotation.coords.iter().all(|x| x.is_finite())
 }
 
 #[cfg(test)]
@@ -317,47 +280,21 @@ mod tests {
     /// Each fault is named with the joint and the numbers.
     #[test]
     fn faults_are_named() {
-        let of = |joints: &[Joint]| {
-            Chain::new(joints, Isometry3::identity())
-                .unwrap_err()
-                .to_string()
-        };
+        let of = |joints: &[Joint]| Chain::new(joints, Isometry3::identity()).unwrap_err().to_string();
         assert_eq!(of(&[]), "the chain has no moving joint, allowed 1..=8");
-        assert_eq!(
-            of(&[joint(); 9]),
-            "the chain has 9 moving joints, allowed 1..=8; fix some of them"
-        );
-        let nan = Joint {
-            position_max: f64::NAN,
-            ..joint()
-        };
-        assert_eq!(
-            of(&[joint(), nan]),
-            "joint 1: a pose, axis or limit is not a finite number"
-        );
-        let inverted = Joint {
-            position_min: 4.0,
-            ..joint()
-        };
-        assert_eq!(
-            of(&[inverted]),
-            "joint 0: position_min = 4 is above position_max = 3"
-        );
-        let still = Joint {
-            velocity_max: 0.0,
-            ..joint()
-        };
+        assert_eq!(of(&[joint(); 9]), "the chain has 9 moving joints, allowed 1..=8; fix some of them");
+        let nan = Joint { position_max: f64::NAN, ..joint() };
+        assert_eq!(of(&[joint(), nan]), "joint 1: a pose, axis or limit is not a finite number");
+        let inverted = Joint { position_min: 4.0, ..joint() };
+        assert_eq!(of(&[inverted]), "joint 0: position_min = 4 is above position_max = 3");
+        let still = Joint { velocity_max: 0.0, ..joint() };
         assert_eq!(of(&[still]), "joint 0: velocity_max = 0, allowed above 0");
     }
 
     /// Whole turns are used to come near, but never past a limit.
     #[test]
     fn the_nearest_turn_within_limits_is_taken() {
-        let wide = Joint {
-            position_min: -7.0,
-            position_max: 7.0,
-            ..joint()
-        };
+        let wide = Joint { position_min: -7.0, position_max: 7.0, ..joint() };
         let turn = core::f64::consts::TAU;
         assert_eq!(wide.equivalent(0.5, 6.0), Some(0.5 + turn));
         assert_eq!(wide.equivalent(1.0, 6.0), Some(1.0));

@@ -42,19 +42,14 @@ impl Chain {
         };
         let mut rotation = UnitQuaternion::identity();
         let mut origin = Vector3::zeros();
-        for (((joint, link), &q), pose) in self
-            .joints()
-            .iter()
-            .zip(&self.links)
-            .zip(position)
-            .zip(&mut poses.base_from_link[1..])
+        for (((joint, link), &q), pose) in
+            self.joints().iter().zip(&self.links).zip(position).zip(&mut poses.base_from_link[1..])
         {
             match joint.kind {
                 JointKind::Revolute => {
                     let (sin, cos) = (0.5 * q).sin_cos();
                     origin += rotation * link.offset;
-                    rotation *=
-                        UnitQuaternion::new_unchecked(link.at_rest * cos + link.turning * sin);
+                    rotation *= UnitQuaternion::new_unchecked(link.at_rest * cos + link.turning * sin);
                 }
                 JointKind::Prismatic => {
                     origin += rotation * (link.offset + link.axis_in_parent * q);
@@ -73,10 +68,7 @@ impl Chain {
     /// Bounded by [`JOINTS_MAX`]; no allocation.
     pub fn jacobian(&self, position: &[f64; JOINTS_MAX]) -> (LinkPoses, Jacobian) {
         let poses = self.forward(position);
-        (
-            poses,
-            self.jacobian_at(&poses, &poses.base_from_tcp.translation.vector),
-        )
+        (poses, self.jacobian_at(&poses, &poses.base_from_tcp.translation.vector))
     }
 
     /// The Jacobian of a point that moves with the link after the last joint up to
@@ -89,9 +81,7 @@ impl Chain {
             let mut column = jacobian.column_mut(index);
             match joint.kind {
                 JointKind::Revolute => {
-                    column
-                        .fixed_rows_mut::<3>(0)
-                        .copy_from(&axis.cross(&(point - pose.translation.vector)));
+                    column.fixed_rows_mut::<3>(0).copy_from(&axis.cross(&(point - pose.translation.vector)));
                     column.fixed_rows_mut::<3>(3).copy_from(&axis);
                 }
                 JointKind::Prismatic => column.fixed_rows_mut::<3>(0).copy_from(&axis),
@@ -113,9 +103,7 @@ impl Chain {
         velocity: &[f64; JOINTS_MAX],
     ) -> Vector3<f64> {
         let mut sum = Vector3::zeros();
-        for (index, (joint, constants)) in
-            self.joints().iter().zip(&self.links).take(link).enumerate()
-        {
+        for (index, (joint, constants)) in self.joints().iter().zip(&self.links).take(link).enumerate() {
             let pose = &poses.base_from_link[index + 1];
             let axis = pose.rotation * constants.axis;
             sum += velocity[index]
@@ -131,8 +119,5 @@ impl Chain {
 /// Yoshikawa's manipulability √det(J·Jᵀ): 0 where the TCP has lost a direction of motion.
 /// Chains of fewer than six joints always answer 0.
 pub fn manipulability(jacobian: &Jacobian) -> f64 {
-    (jacobian * jacobian.transpose())
-        .determinant()
-        .max(0.0)
-        .sqrt()
+    (jacobian * jacobian.transpose()).determinant().max(0.0).sqrt()
 }

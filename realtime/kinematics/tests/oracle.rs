@@ -2,6 +2,7 @@
 //!
 //! `data/*_fk.csv`: pinocchio 4.1.0 on the UR5 and Panda of the public package
 //! `example-robot-data` 6.0.0: joint positions, TCP pose, Jacobian in base axes.
+#![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
 
 use std::path::Path;
 
@@ -9,15 +10,10 @@ use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector
 use tandem_kinematics::{Chain, IkFailure, JOINTS_MAX, Joint, JointKind};
 
 fn rows(file: &str) -> Vec<Vec<f64>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/data")
-        .join(file);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file);
     let text = std::fs::read_to_string(&path).expect("reference data is beside the test");
     let number = |field: &str| field.parse().unwrap_or(f64::NAN);
-    text.lines()
-        .skip(1)
-        .map(|line| line.split(',').map(number).collect())
-        .collect()
+    text.lines().skip(1).map(|line| line.split(',').map(number).collect()).collect()
 }
 
 fn pose(n: &[f64]) -> Isometry3<f64> {
@@ -68,20 +64,10 @@ fn poses_and_jacobians_agree_with_the_reference() {
             let reference = pose(&row[count..count + 7]);
             let (shift, turn) = off_by(&chain, &position, &reference);
             // A rotation error is measured through acos, which halves the digits.
-            assert!(
-                shift < 1e-9 && turn < 1e-7,
-                "{robot} row {index}: {shift} m, {turn} rad"
-            );
-            let difference = poses
-                .base_from_tcp
-                .rotation
-                .to_rotation_matrix()
-                .into_inner()
+            assert!(shift < 1e-9 && turn < 1e-7, "{robot} row {index}: {shift} m, {turn} rad");
+            let difference = poses.base_from_tcp.rotation.to_rotation_matrix().into_inner()
                 - reference.rotation.to_rotation_matrix().into_inner();
-            assert!(
-                difference.amax() < 1e-9,
-                "{robot} row {index}: {difference}"
-            );
+            assert!(difference.amax() < 1e-9, "{robot} row {index}: {difference}");
             for r in 0..6 {
                 for c in 0..count {
                     let expected = row[count + 7 + r * count + c];
@@ -105,36 +91,23 @@ fn the_closed_form_finds_every_branch() {
     for (index, row) in rows("ur5_fk.csv").iter().enumerate() {
         let position = positions(row, 6);
         let goal = chain.forward(&position).base_from_tcp;
-        let branches = chain
-            .branches(&goal, &[0.0; JOINTS_MAX])
-            .unwrap_or_else(|e| panic!("row {index}: {e}"));
+        let branches = chain.branches(&goal, &[0.0; JOINTS_MAX]).unwrap_or_else(|e| panic!("row {index}: {e}"));
         counted += branches.as_slice().len();
         for branch in branches.as_slice() {
             let (shift, turn) = off_by(&chain, branch, &goal);
-            assert!(
-                shift < 1e-8 && turn < 3e-8,
-                "row {index}: {shift} m, {turn} rad in {branch:?}"
-            );
+            assert!(shift < 1e-8 && turn < 3e-8, "row {index}: {shift} m, {turn} rad in {branch:?}");
         }
         let found = branches.as_slice().iter().any(|branch| {
-            branch.iter().zip(&position).all(|(a, b)| {
-                (a - b).abs() < 1e-6 || ((a - b).abs() - std::f64::consts::TAU).abs() < 1e-6
-            })
+            branch
+                .iter()
+                .zip(&position)
+                .all(|(a, b)| (a - b).abs() < 1e-6 || ((a - b).abs() - std::f64::consts::TAU).abs() < 1e-6)
         });
         assert!(found, "row {index}: {position:?} is not among {branches:?}");
         let nearest = chain.inverse(&goal, &position).expect("solved above");
-        assert!(
-            nearest
-                .iter()
-                .zip(&position)
-                .all(|(a, b)| (a - b).abs() < 1e-6),
-            "row {index}: {nearest:?}"
-        );
+        assert!(nearest.iter().zip(&position).all(|(a, b)| (a - b).abs() < 1e-6), "row {index}: {nearest:?}");
     }
-    assert!(
-        counted as f64 / rows("ur5_fk.csv").len() as f64 > 5.0,
-        "{counted} branches"
-    );
+    assert!(counted as f64 / rows("ur5_fk.csv").len() as f64 > 5.0, "{counted} branches");
 }
 
 /// The seven-joint arm is solved numerically: all reference poses from a far seed.
@@ -166,41 +139,18 @@ fn failures_are_typed() {
         let seed = [0.1, -1.0, 0.2, -1.2, 0.3, 1.4, 0.5, 0.0];
         let goal = chain.forward(&seed).base_from_tcp;
         let far = Isometry3::translation(3.0, 0.0, 0.0) * goal;
-        assert_eq!(
-            chain.inverse(&far, &seed),
-            Err(IkFailure::Unreachable),
-            "{robot}"
-        );
+        assert_eq!(chain.inverse(&far, &seed), Err(IkFailure::Unreachable), "{robot}");
         let mut broken = goal;
         broken.translation.vector.x = f64::NAN;
-        assert_eq!(
-            chain.inverse(&broken, &seed),
-            Err(IkFailure::NotFinite),
-            "{robot}"
-        );
+        assert_eq!(chain.inverse(&broken, &seed), Err(IkFailure::NotFinite), "{robot}");
         let mut lost = seed;
         lost[2] = f64::INFINITY;
-        assert_eq!(
-            chain.inverse(&goal, &lost),
-            Err(IkFailure::NotFinite),
-            "{robot}"
-        );
+        assert_eq!(chain.inverse(&goal, &lost), Err(IkFailure::NotFinite), "{robot}");
         // Every joint held to a hair's breadth far from the solution.
-        let held: Vec<Joint> = chain
-            .joints()
-            .iter()
-            .map(|joint| Joint {
-                position_min: 2.9,
-                position_max: 2.901,
-                ..*joint
-            })
-            .collect();
+        let held: Vec<Joint> =
+            chain.joints().iter().map(|joint| Joint { position_min: 2.9, position_max: 2.901, ..*joint }).collect();
         let held = Chain::new(&held, *chain.tool()).expect("narrow limits are limits");
-        assert_eq!(
-            held.inverse(&goal, &seed),
-            Err(IkFailure::JointLimit),
-            "{robot}"
-        );
+        assert_eq!(held.inverse(&goal, &seed), Err(IkFailure::JointLimit), "{robot}");
     }
 }
 
@@ -212,10 +162,7 @@ fn what_is_not_finite_shows() {
         for joint in 0..6 {
             let mut position = [0.3; JOINTS_MAX];
             position[joint] = value;
-            assert!(
-                !chain.forward(&position).is_finite(),
-                "joint {joint} at {value}"
-            );
+            assert!(!chain.forward(&position).is_finite(), "joint {joint} at {value}");
         }
     }
     assert!(chain.forward(&[0.3; JOINTS_MAX]).is_finite());

@@ -52,11 +52,8 @@ pub struct Branches {
 }
 
 impl Branches {
-    const NONE: Self = Self {
-        solutions: [[0.0; JOINTS_MAX]; BRANCHES_MAX],
-        distances: [f64::INFINITY; BRANCHES_MAX],
-        count: 0,
-    };
+    const NONE: Self =
+        Self { solutions: [[0.0; JOINTS_MAX]; BRANCHES_MAX], distances: [f64::INFINITY; BRANCHES_MAX], count: 0 };
 
     /// The solutions, rad or m, nearest to the seed first (Euclidean distance of joint positions).
     pub fn as_slice(&self) -> &[[f64; JOINTS_MAX]] {
@@ -66,16 +63,9 @@ impl Branches {
     fn insert(&mut self, solution: &[f64; JOINTS_MAX], seed: &[f64; JOINTS_MAX]) {
         const SAME: f64 = 1e-6;
         let apart = |a: &[f64; JOINTS_MAX], b: &[f64; JOINTS_MAX]| -> f64 {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| (a - b) * (a - b))
-                .sum::<f64>()
-                .sqrt()
+            a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>().sqrt()
         };
-        let known = self
-            .as_slice()
-            .iter()
-            .any(|other| apart(other, solution) < SAME);
+        let known = self.as_slice().iter().any(|other| apart(other, solution) < SAME);
         if known || self.count >= BRANCHES_MAX {
             return;
         }
@@ -103,24 +93,15 @@ impl Chain {
     /// # Realtime
     /// No allocation. Closed form: 8 branches. Numeric: at most 33 descents of 60 steps each
     /// (about 2 ms), so plan with it, do not servo with it.
-    pub fn inverse(
-        &self,
-        goal: &Isometry3<f64>,
-        seed: &[f64; JOINTS_MAX],
-    ) -> Result<[f64; JOINTS_MAX], IkFailure> {
-        self.branches(goal, seed)
-            .map(|branches| branches.solutions[0])
+    pub fn inverse(&self, goal: &Isometry3<f64>, seed: &[f64; JOINTS_MAX]) -> Result<[f64; JOINTS_MAX], IkFailure> {
+        self.branches(goal, seed).map(|branches| branches.solutions[0])
     }
 
     /// As [`Chain::inverse`], with all branches where the closed form applies. At least one comes back.
     ///
     /// # Errors
     /// What [`IkFailure`] names.
-    pub fn branches(
-        &self,
-        goal: &Isometry3<f64>,
-        seed: &[f64; JOINTS_MAX],
-    ) -> Result<Branches, IkFailure> {
+    pub fn branches(&self, goal: &Isometry3<f64>, seed: &[f64; JOINTS_MAX]) -> Result<Branches, IkFailure> {
         let count = self.joint_count();
         let seed_is_finite = seed[..count].iter().all(|q| q.is_finite());
         let rotation_is_unit = (goal.rotation.norm() - 1.0).abs() < 1e-5;
@@ -143,11 +124,7 @@ impl Chain {
     }
 
     /// The solution with every turn chosen within limits and near the seed.
-    fn within_limits(
-        &self,
-        solution: &[f64; JOINTS_MAX],
-        near: &[f64; JOINTS_MAX],
-    ) -> Option<[f64; JOINTS_MAX]> {
+    fn within_limits(&self, solution: &[f64; JOINTS_MAX], near: &[f64; JOINTS_MAX]) -> Option<[f64; JOINTS_MAX]> {
         let mut chosen = [0.0; JOINTS_MAX];
         for (index, joint) in self.joints().iter().enumerate() {
             chosen[index] = joint.equivalent(solution[index], near[index])?;

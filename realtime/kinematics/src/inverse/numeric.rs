@@ -33,11 +33,7 @@ struct Descent {
 }
 
 /// One solution within limits.
-pub(super) fn solve(
-    chain: &Chain,
-    goal: &Isometry3<f64>,
-    near: &[f64; JOINTS_MAX],
-) -> Result<Branches, IkFailure> {
+pub(super) fn solve(chain: &Chain, goal: &Isometry3<f64>, near: &[f64; JOINTS_MAX]) -> Result<Branches, IkFailure> {
     let mut start = *near;
     for (q, joint) in start.iter_mut().zip(chain.joints()) {
         *q = q.max(joint.position_min).min(joint.position_max);
@@ -45,11 +41,7 @@ pub(super) fn solve(
     let mut best = f64::INFINITY;
     let mut best_manipulability = f64::INFINITY;
     for attempt in 0..=RESTARTS {
-        let from = if attempt == 0 {
-            start
-        } else {
-            scattered(chain, attempt, &start, true)
-        };
+        let from = if attempt == 0 { start } else { scattered(chain, attempt, &start, true) };
         let descent = descend(chain, goal, &from, true);
         if descent.residual < TOLERANCE
             && let Some(solution) = chain.within_limits(&descent.position, near)
@@ -63,12 +55,9 @@ pub(super) fn solve(
             best_manipulability = descent.manipulability;
         }
     }
+    // Would it be there without limits? Then they are the reason.
     for attempt in 0..4 {
-        let from = if attempt == 0 {
-            start
-        } else {
-            scattered(chain, attempt, &start, true)
-        };
+        let from = if attempt == 0 { *near } else { scattered(chain, attempt, near, false) };
         if descend(chain, goal, &from, false).residual < TOLERANCE {
             return Err(IkFailure::JointLimit);
         }
@@ -80,12 +69,7 @@ pub(super) fn solve(
 }
 
 /// Brings a near-solution below `tolerance`; answers whether it is there.
-pub(super) fn polish(
-    chain: &Chain,
-    goal: &Isometry3<f64>,
-    position: &mut [f64; JOINTS_MAX],
-    tolerance: f64,
-) -> bool {
+pub(super) fn polish(chain: &Chain, goal: &Isometry3<f64>, position: &mut [f64; JOINTS_MAX], tolerance: f64) -> bool {
     /// Below this there is nothing to gain.
     const EXACT: f64 = 1e-11;
     const POLISH_STEPS: u32 = 4;
@@ -94,8 +78,7 @@ pub(super) fn polish(
         let (poses, jacobian) = chain.jacobian(position);
         let left = Chain::residual(&poses.base_from_tcp, goal);
         let norm = left.norm();
-        // Written so that what is not a number ends here as well.
-        if norm < EXACT || !(norm < residual) {
+        if norm < EXACT || norm >= residual || norm.is_nan() {
             residual = residual.min(norm);
             break;
         }
@@ -113,34 +96,17 @@ pub(super) fn polish(
     residual < tolerance
 }
 
-fn descend(
-    chain: &Chain,
-    goal: &Isometry3<f64>,
-    from: &[f64; JOINTS_MAX],
-    limited: bool,
-) -> Descent {
+fn descend(chain: &Chain, goal: &Isometry3<f64>, from: &[f64; JOINTS_MAX], limited: bool) -> Descent {
     let mut position = *from;
-    let mut best = Descent {
-        position,
-        residual: f64::INFINITY,
-        manipulability: 0.0,
-    };
+    let mut best = Descent { position, residual: f64::INFINITY, manipulability: 0.0 };
     let mut idle = 0;
     for _ in 0..STEPS {
         let (poses, mut jacobian) = chain.jacobian(&position);
         let left = Chain::residual(&poses.base_from_tcp, goal);
         let norm = left.norm();
-        idle = if norm < 0.9 * best.residual {
-            0
-        } else {
-            idle + 1
-        };
+        idle = if norm < 0.9 * best.residual { 0 } else { idle + 1 };
         if norm < best.residual {
-            best = Descent {
-                position,
-                residual: norm,
-                manipulability: 0.0,
-            };
+            best = Descent { position, residual: norm, manipulability: 0.0 };
         }
         if norm < 0.1 * TOLERANCE || idle > 8 {
             break;
@@ -156,16 +122,8 @@ fn descend(
             step_taken = again;
         }
         let longest = step_taken.amax();
-        let scale = if longest > STEP_MAX {
-            STEP_MAX / longest
-        } else {
-            1.0
-        };
-        for ((q, dq), joint) in position
-            .iter_mut()
-            .zip(step_taken.iter())
-            .zip(chain.joints())
-        {
+        let scale = if longest > STEP_MAX { STEP_MAX / longest } else { 1.0 };
+        for ((q, dq), joint) in position.iter_mut().zip(step_taken.iter()).zip(chain.joints()) {
             *q += scale * dq;
             if limited {
                 *q = q.max(joint.position_min).min(joint.position_max);
@@ -209,12 +167,7 @@ fn step(
 }
 
 /// Start number `attempt`: a Halton point at most half a turn from `near`, within the limits if asked.
-fn scattered(
-    chain: &Chain,
-    attempt: u32,
-    near: &[f64; JOINTS_MAX],
-    limited: bool,
-) -> [f64; JOINTS_MAX] {
+fn scattered(chain: &Chain, attempt: u32, near: &[f64; JOINTS_MAX], limited: bool) -> [f64; JOINTS_MAX] {
     const PRIMES: [u32; JOINTS_MAX] = [2, 3, 5, 7, 11, 13, 17, 19];
     let mut start = [0.0; JOINTS_MAX];
     for (index, joint) in chain.joints().iter().enumerate() {

@@ -38,12 +38,7 @@ pub(crate) struct ParallelShoulder {
 impl ParallelShoulder {
     /// The closed form of a chain, if it has one.
     pub(crate) fn of(chain: &Chain) -> Option<Self> {
-        if chain.joint_count() != 6
-            || chain
-                .joints()
-                .iter()
-                .any(|joint| joint.kind != JointKind::Revolute)
-        {
+        if chain.joint_count() != 6 || chain.joints().iter().any(|joint| joint.kind != JointKind::Revolute) {
             return None;
         }
         let poses = chain.forward(&[0.0; JOINTS_MAX]);
@@ -75,20 +70,9 @@ impl ParallelShoulder {
         points[5] = wrist;
         let senses = [1, 2, 3].map(|index: usize| directions[index].dot(&w).signum());
         // Links of the planar arm must have length, or the elbow has no triangle.
-        let form = Self {
-            directions,
-            points,
-            senses,
-            base_from_tcp: poses.base_from_tcp,
-        };
-        let lengths = [
-            form.across(&(points[2] - points[1])),
-            form.across(&(points[3] - points[2])),
-        ];
-        lengths
-            .iter()
-            .all(|length| length.norm() > 1e-3)
-            .then_some(form)
+        let form = Self { directions, points, senses, base_from_tcp: poses.base_from_tcp };
+        let lengths = [form.across(&(points[2] - points[1])), form.across(&(points[3] - points[2]))];
+        lengths.iter().all(|length| length.norm() > 1e-3).then_some(form)
     }
 
     /// All branches within limits, nearest to `near` first.
@@ -117,11 +101,7 @@ impl ParallelShoulder {
         }
     }
 
-    fn candidates(
-        &self,
-        motion: &Isometry3<f64>,
-        near: &[f64; JOINTS_MAX],
-    ) -> [Option<[f64; JOINTS_MAX]>; 8] {
+    fn candidates(&self, motion: &Isometry3<f64>, near: &[f64; JOINTS_MAX]) -> [Option<[f64; JOINTS_MAX]>; 8] {
         let mut found = [None; 8];
         let w = self.directions[1];
         let Some(shoulders) = self.shoulder(motion) else {
@@ -135,11 +115,7 @@ impl ParallelShoulder {
             for (k, q5) in wrists.into_iter().enumerate() {
                 let q6 = self.flange(&rest, q5).unwrap_or(near[5]);
                 let planar = rest * self.turn(5, q6).inverse() * self.turn(4, q5).inverse();
-                let sum = angle_about(
-                    &w,
-                    &self.across(&any_across(&w)),
-                    &(planar.rotation * any_across(&w)),
-                );
+                let sum = angle_about(&w, &self.across(&any_across(&w)), &(planar.rotation * any_across(&w)));
                 let Some(elbows) = self.elbow(&planar) else {
                     continue;
                 };
@@ -220,11 +196,7 @@ fn rotation(axis: &Vector3<f64>, angle: f64) -> UnitQuaternion<f64> {
 
 /// A unit vector square to `w`.
 fn any_across(w: &Vector3<f64>) -> Vector3<f64> {
-    let other = if w.x.abs() < 0.7 {
-        Vector3::x()
-    } else {
-        Vector3::y()
-    };
+    let other = if w.x.abs() < 0.7 { Vector3::x() } else { Vector3::y() };
     w.cross(&other).normalize()
 }
 
@@ -237,11 +209,5 @@ fn angle_about(axis: &Vector3<f64>, from: &Vector3<f64>, to: &Vector3<f64>) -> f
 /// acos that forgives rounding at its ends and answers `None` past them.
 fn acos(cosine: f64) -> Option<f64> {
     const FORGIVEN: f64 = 1e-9;
-    (cosine.abs() <= 1.0 + FORGIVEN).then(|| {
-        if cosine <= -1.0 {
-            PI
-        } else {
-            cosine.min(1.0).acos()
-        }
-    })
+    (cosine.abs() <= 1.0 + FORGIVEN).then(|| if cosine <= -1.0 { PI } else { cosine.min(1.0).acos() })
 }

@@ -1,0 +1,223 @@
+//! A cell: everything its files say, checked.
+
+use crate::fault::Faults;
+use crate::human::Human;
+use crate::layout::Layout;
+use crate::perception::Perception;
+use crate::plant::Plant;
+use crate::product::{self, Product};
+use crate::read::{Reading, Table};
+use crate::strategy::{self, ReferenceRow, StrategyRow};
+use crate::supervisor::Supervisor;
+use crate::timing::{Realtime, Timing};
+use std::path::{Component, Path, PathBuf};
+
+/// Where the strategy library and the journal are kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Store {
+    /// `sqlite:` or `mysql:` URL; `None` is a SQLite file in the user's state folder.
+    pub url: Option<String>,
+}
+
+/// Everything the files of a cell say. [`Cell::load`] is the only way to make one.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Cell {
+    /// Name of the cell, lower case.
+    pub name: String,
+    /// The cell file, as named by the user.
+    pub file: PathBuf,
+    /// Hash of all files read, blake3 cut to 64 bits: peers of another configuration are refused.
+    pub hash: u64,
+    /// URDF of the arm.
+    pub robot_file: PathBuf,
+    /// When each role runs.
+    pub timing: Timing,
+    /// What is asked of the operating system.
+    pub realtime: Realtime,
+    /// What stands where.
+    pub layout: Layout,
+    /// The person.
+    pub human: Human,
+    /// The simulated hardware.
+    pub plant: Plant,
+    /// Recognition.
+    pub perception: Perception,
+    /// The supervisor's policy.
+    pub supervisor: Supervisor,
+    /// Where the library and the journal are kept.
+    pub store: Store,
+    /// What is assembled.
+    pub product: Product,
+    /// Feature and parameters to mode and tool.
+    pub reference: Vec<ReferenceRow>,
+    /// What the strategy library is first filled with.
+    pub strategies: Vec<StrategyRow>,
+}
+
+impl Cell {
+    /// Reads a cell file and every file it names. `product` replaces the product the
+    /// cell file names: a name in its products folder, or a path to a `.toml` file.
+    ///
+    /// # Errors
+    /// All faults of all files.
+    pub fn load(path: &Path, product: Option<&str>) -> Result<Self, Faults> {
+        let reading = Reading::new();
+        let cell = read(path, product, &reading);
+        let (hash, faults) = reading.finish();
+        match cell {
+            Some(cell) if faults.is_empty() => Ok(Self { hash, ..cell }),
+            _ => Err(Faults::new(faults)),
+        }
+    }
+}
+
+fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
+    let document = reading.open(path, None)?;
+    let parsed = document.parse(reading);
+    let root = document.root(reading, &parsed);
+    let folder = path.parent().unwrap_or(Path::new(""));
+
+    // Every part is read before any is missed, so that one pass reports all faults.
+    let name = root.text("name");
+    let timing = Timing::read(&root);
+    let realtime = Realtime::read(&root);
+    let layout = Layout::read(&root);
+    let human = Human::read(&root);
+    let plant = Plant::read(&root);
+    let perception = Perception::read(&root, folder);
+    let supervisor = Supervisor::read(&root);
+    let store = read_store(&root);
+    let robot_file = root.text("robot").map(|file| beside(folder, &file));
+    let product = layout
+        .as_ref()
+        .and_then(|layout| read_product(&root, product, folder, layout, reading));
+    let (mut reference, mut strategies) = (Vec::new(), Vec::new());
+    for file in root.texts("strategies") {
+        let file = beside(folder, &file);
+        let asked = root.fault_at(
+            "strategies",
+            &format!("\"{}\"", file.display()),
+            "a strategy file",
+            "",
+        );
+        let Some(document) = reading.open(&file, Some(asked)) else {
+            continue;
+        };
+        let parsed = document.parse(reading);
+        let table = document.root(reading, &parsed);
+        if table.has("reference") {
+            reference.extend(strategy::read_reference(&table));
+        }
+        strategies.extend(strategy::read_strategies(&table));
+    }
+    if reference.is_empty() || strategies.is_empty() {
+        let found = format!(
+            "{} reference rows, {} strategies",
+            reference.len(),
+            strategies.len()
+        );
+        root.refuse(
+            "strategies",
+            &found,
+            "at least one of each",
+            "list the files of config/strategies",
+        );
+    }
+
+    Some(Cell {
+        name: name?,
+        file: path.to_owned(),
+        hash: 0,
+        robot_file: robot_file?,
+        timing,
+        realtime,
+        layout: layout?,
+        human: human?,
+        plant: plant?,
+        perception: perception?,
+        supervisor: supervisor?,
+        store,
+        product: product?,
+        reference,
+        strategies,
+    })
+}
+
+fn read_store(root: &Table<'_>) -> Store {
+    if !root.has("store") {
+        return Store { url: None };
+    }
+    let url = root.table("store").and_then(|table| {
+        let url = table.text_if("url")?;
+        if !["sqlite:", "mysql:", "mariadb:"]
+            .iter()
+            .any(|scheme| url.starts_with(scheme))
+        {
+            let scheme = url.split(':').next().unwrap_or_default();
+            let advice = "write sqlite://FILE or mysql://USER@HOST/DATABASE";
+            table.refuse(
+                "url",
+                &format!("\"{scheme}:…\""),
+                "sqlite:, mysql: or mariadb:",
+                advice,
+            );
+        }
+        Some(url)
+    });
+    Store { url }
+}
+
+fn read_product(
+    root: &Table<'_>,
+    chosen: Option<&str>,
+    folder: &Path,
+    layout: &Layout,
+    reading: &Reading,
+) -> Option<Product> {
+    let products = root
+        .text("products")
+        .map(|products| beside(folder, &products));
+    let named = root.text("product");
+    let name = chosen.map(str::to_owned).or(named)?;
+    let file = if name.ends_with(".toml") {
+        PathBuf::from(&name)
+    } else {
+        products?.join(format!("{name}.toml"))
+    };
+    let found = format!("\"{name}\"");
+    let asked = chosen
+        .is_none()
+        .then(|| root.fault_at("product", &found, "a product of the products folder", ""));
+    let document = reading.open(&file, asked)?;
+    let parsed = document.parse(reading);
+    let table = document.root(reading, &parsed);
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let properties = table.text("properties").and_then(|properties| {
+        let properties = beside(folder, &properties);
+        let found = format!("\"{}\"", properties.display());
+        reading.open(
+            &properties,
+            Some(table.fault_at("properties", &found, "a JSON file", "")),
+        )
+    });
+    Some(product::read(&table, properties.as_ref(), layout, reading))
+}
+
+/// A path as written in a file of `folder`, without detours.
+pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
+    let mut out = PathBuf::new();
+    for component in folder.join(written).components() {
+        match component {
+            Component::ParentDir
+                if matches!(out.components().next_back(), Some(Component::Normal(_))) =>
+            {
+                out.pop();
+            }
+            Component::CurDir => {}
+            other => out.push(other),
+        }
+    }
+    out
+}
