@@ -60,7 +60,8 @@ mod tests {
     #[test]
     fn numbers_go_on_after_a_restart() {
         let task = MotionTask { action: Code::of(EffectorAction::Grasp), ..MotionTask::default() };
-        let mut state = EffectorState { command_id: 41, phase: Code::of(EffectorPhase::Done), ..EffectorState::default() };
+        let mut state =
+            EffectorState { command_id: 41, phase: Code::of(EffectorPhase::Done), ..EffectorState::default() };
         let mut effector = Effector::default();
         effector.adopt(&state);
         assert_eq!((effector.command().id, effector.command().action), (41, Code::of(EffectorAction::Keep)));

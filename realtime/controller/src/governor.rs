@@ -39,7 +39,8 @@ pub(crate) struct Person {
 
 impl Person {
     pub(crate) fn new(separation: &Separation, age: f64, sigma: f64, params: &SeparationParams) -> Self {
-        let closing = -separation.human_velocity.dot(&separation.direction);
+        let closing: f64 =
+            -separation.human_velocity.iter().zip(&separation.direction).map(|(v, d)| v * d).sum::<f64>();
         // Written so that a speed that is no number stays one: it will stop the arm.
         let speed = if closing <= params.human_speed_min { params.human_speed_min } else { closing };
         Self { distance: separation.distance, speed, age, sigma }
@@ -81,11 +82,6 @@ impl Governor {
             *stop = Law::stop_from(cruising, limits)?;
         }
         Ok(())
-    }
-
-    /// The level in force.
-    pub(crate) fn level(&self) -> usize {
-        self.level
     }
 
     /// Share of the path's speed at a level.

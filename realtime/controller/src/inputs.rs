@@ -157,7 +157,8 @@ fn human_is_valid(human: &HumanState) -> bool {
         && (0.0..=1.0).contains(&human.position_sigma)
         && human.capsules[..count].iter().all(|capsule| {
             capsule.ends.as_flattened().iter().all(|x| x.abs() <= 100.0)
-                && (0.0..=1.0).contains(&capsule.radius)
+                && capsule.radius > 0.0
+                && capsule.radius <= 1.0
                 && capsule.velocity.iter().all(|v| v.abs() <= 20.0)
         })
 }

@@ -45,6 +45,7 @@ pub(crate) struct Law {
     time: f64,
     state: State,
     stopping: bool,
+    level: usize,
 }
 
 /// The generator refused: a state or a limit is not a number. An internal fault.
@@ -61,13 +62,13 @@ impl Law {
             ..Input::default()
         };
         let trajectory = Trajectory::calculate(&input).map_err(|_| Refused)?;
-        Ok(Self { trajectory, time: 0.0, state: from, stopping: false })
+        Ok(Self { trajectory, time: 0.0, state: from, stopping: false, level: 0 })
     }
 
     /// To rest as soon as possible, from any state.
     pub(crate) fn stop(from: State, limits: &LawLimits) -> Result<Self, Refused> {
         let trajectory = Trajectory::stop(&[from], &[limits.symmetric()]).map_err(|_| Refused)?;
-        Ok(Self { trajectory, time: 0.0, state: from, stopping: true })
+        Ok(Self { trajectory, time: 0.0, state: from, stopping: true, level: 0 })
     }
 
     /// What a stop from a state takes.
@@ -75,6 +76,15 @@ impl Law {
         let law = Self::stop(from, limits)?;
         let duration = law.trajectory.duration();
         Ok(Stop { duration, end: law.trajectory.at(duration)[0].position })
+    }
+
+    /// Notes the level of speed it was made for.
+    pub(crate) fn for_level(self, level: usize) -> Self {
+        Self { level, ..self }
+    }
+
+    pub(crate) fn made_for(&self) -> usize {
+        self.level
     }
 
     pub(crate) fn state(&self) -> State {

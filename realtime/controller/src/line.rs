@@ -37,7 +37,8 @@ impl Line {
         let length = travel.max(turn * TURN_LENGTH);
         let intervals = (travel / SPACING).max(turn / TURN_SPACING).ceil();
         let count = if length < SHORTEST { 2 } else { (intervals as usize + 1).clamp(5, NODES_MAX) };
-        let mut line = Self { from: *from, to: *to, nodes: [[0.0; JOINTS_MAX]; NODES_MAX], count, done: 1, backward, length };
+        let mut line =
+            Self { from: *from, to: *to, nodes: [[0.0; JOINTS_MAX]; NODES_MAX], count, done: 1, backward, length };
         if length < SHORTEST {
             line.nodes = [*known; NODES_MAX];
             line.length = 0.0;
@@ -69,11 +70,7 @@ impl Line {
             let slot = self.slot(self.done);
             let share = slot as f64 / (self.count - 1) as f64;
             let position = self.from.translation.vector.lerp(&self.to.translation.vector, share);
-            let rotation = self
-                .from
-                .rotation
-                .try_slerp(&self.to.rotation, share, 1e-9)
-                .unwrap_or(self.to.rotation);
+            let rotation = self.from.rotation.try_slerp(&self.to.rotation, share, 1e-9).unwrap_or(self.to.rotation);
             let pose = Isometry3::from_parts(Translation3::from(position), rotation);
             let neighbour = self.nodes[self.slot(self.done - 1)];
             let solution = chain.inverse(&pose, &neighbour)?;

@@ -108,6 +108,11 @@ impl Motion {
         }
     }
 
+    /// The brakes are closed: whatever the arm answers to begins later than now.
+    pub(crate) fn slack_anew(&mut self, now: Stamp) {
+        self.mode = Mode::Slack { since: now };
+    }
+
     /// While slack: takes the measured position for the set-point.
     pub(crate) fn mirror(&mut self, arm: &JointState) {
         self.set = SetPoint { position: arm.position, ..SetPoint::default() };

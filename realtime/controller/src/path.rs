@@ -53,7 +53,7 @@ impl Path {
     pub(crate) fn through(nodes: &[Joints; NODES_MAX], count: usize, length: f64) -> Self {
         let count = count.clamp(2, NODES_MAX);
         let mut path = Self { nodes: *nodes, curvature: [[0.0; JOINTS_MAX]; NODES_MAX], count, length };
-        if count >= 4 && length > 0.0 {
+        if count >= 5 && length > 0.0 {
             for joint in 0..JOINTS_MAX {
                 path.bend(joint);
             }
@@ -61,15 +61,14 @@ impl Path {
         path
     }
 
-    /// Solves for the second derivatives of one joint; end slopes by one-sided differences of third order.
+    /// Solves for the second derivatives of one joint; end slopes by one-sided differences of fourth order.
     fn bend(&mut self, joint: usize) {
         let last = self.count - 1;
         let h = self.spacing();
         let q = |i: usize| self.nodes[i][joint];
-        let slope =
-            |a: f64, b: f64, c: f64, d: f64| (-11.0 * a + 18.0 * b - 9.0 * c + 2.0 * d) / (6.0 * h);
-        let first = slope(q(0), q(1), q(2), q(3));
-        let end = -slope(q(last), q(last - 1), q(last - 2), q(last - 3));
+        let slope = |q: [f64; 5]| (-25.0 * q[0] + 48.0 * q[1] - 36.0 * q[2] + 16.0 * q[3] - 3.0 * q[4]) / (12.0 * h);
+        let first = slope([0, 1, 2, 3, 4].map(q));
+        let end = -slope([0, 1, 2, 3, 4].map(|k| q(last - k)));
         // Rows: (2 1), (1 4 1) ..., (1 2), right-hand sides as below; Thomas' algorithm.
         let mut upper = [0.0; NODES_MAX];
         let mut right = [0.0; NODES_MAX];
@@ -123,8 +122,7 @@ impl Path {
             let (q0, q1) = (self.nodes[i][joint], self.nodes[i + 1][joint]);
             let (m0, m1) = (self.curvature[i][joint], self.curvature[i + 1][joint]);
             point.position[joint] = a * q0 + b * q1 + ((a * a * a - a) * m0 + (b * b * b - b) * m1) * h * h / 6.0;
-            point.first[joint] =
-                (q1 - q0) / h + ((3.0 * b * b - 1.0) * m1 - (3.0 * a * a - 1.0) * m0) * h / 6.0;
+            point.first[joint] = (q1 - q0) / h + ((3.0 * b * b - 1.0) * m1 - (3.0 * a * a - 1.0) * m0) * h / 6.0;
             point.second[joint] = a * m0 + b * m1;
         }
         point

@@ -486,8 +486,7 @@ fn via_points(route: usize, from: &Joints, to: &Joints, tools: &Tools<'_>, vias:
         let side = level.try_normalize(1e-3).unwrap_or_else(Vector3::y);
         let mut position = start.translation.vector.lerp(&end.translation.vector, 0.5) + side * aside;
         position.z = top;
-        let rotation: UnitQuaternion<f64> =
-            start.rotation.try_slerp(&end.rotation, 0.5, 1e-6).unwrap_or(end.rotation);
+        let rotation: UnitQuaternion<f64> = start.rotation.try_slerp(&end.rotation, 0.5, 1e-6).unwrap_or(end.rotation);
         Isometry3::from_parts(Translation3::from(position), rotation)
     };
     let mut halfway = *from;

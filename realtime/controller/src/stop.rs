@@ -34,10 +34,6 @@ impl Causes {
         self.0 & (1 << cause.code()) != 0
     }
 
-    pub(crate) fn none(self) -> bool {
-        self.0 == 0
-    }
-
     /// The strictest cause; among equals the one with the lowest code.
     pub(crate) fn worst(self) -> Option<StopCause> {
         let seen = || StopCause::ALL.iter().copied().filter(|cause| self.has(*cause));

@@ -46,6 +46,11 @@ impl Sweep {
         Self { next: from, clear_to: from, rate, margin, floor, blocked: false }
     }
 
+    /// A walk that has been made already, to the end of a path.
+    pub(crate) fn done(length: f64) -> Self {
+        Self { next: f64::INFINITY, clear_to: length, ..Self::default() }
+    }
+
     /// The length up to which the path is known to be clear.
     pub(crate) fn clear_to(&self) -> f64 {
         self.clear_to
