@@ -1,11 +1,7 @@
 //! Against ruckig's C++: never longer than what it finds, and valid by an independent check.
 
-mod cases;
-mod check;
-mod exact;
-
-use cases::Case;
-use check::{Faults, check};
+use crate::cases::{self, Case};
+use crate::check::{Faults, check};
 use tandem_trajectory::{Error, Interface, Profile, Trajectory};
 
 fn solve<const N: usize>(case: &Case) -> Result<(f64, Vec<Profile>), Error> {
