@@ -69,7 +69,7 @@ fn every_random_problem_is_solved_validly() {
                 for (worst, fault) in worst.iter_mut().zip(relative) {
                     *worst = worst.max(if fault.is_nan() { f64::INFINITY } else { fault });
                 }
-                let excess = 1e-11 + 2.0 * blur * (1.0 + duration);
+                let excess = 1e-11 + (2.0 * blur + 1e-15 * push) * duration;
                 assert!(
                     relative[0] < 1e-14
                         && relative[1] < 1e-14
