@@ -456,6 +456,23 @@ fn the_feeder_answers_every_request() {
     assert_eq!(rig.ask(RequestKind::Present, 0), Some(RequestPhase::Served));
 }
 
+/// A scan shows the part that is there, to the request that asked for it, and nothing when none is.
+#[test]
+fn the_camera_sees_the_presented_part() {
+    let mut rig = Rig::new(9);
+    let mut cloud = Box::new(PointCloud::default());
+    rig.plant.scan(&mut cloud);
+    assert_eq!((cloud.request, cloud.point_count), (0, 0));
+    for part in 0..rig.cell.product.parts.len() {
+        rig.plant.parts.clear(&mut rig.plant.world);
+        assert_eq!(rig.ask(RequestKind::Present, part), Some(RequestPhase::Served));
+        rig.cycles(500);
+        rig.plant.scan(&mut cloud);
+        assert_eq!(cloud.request, rig.request.id);
+        assert!(cloud.point_count > 5_000, "part {part}: {} points", cloud.point_count);
+    }
+}
+
 /// Alone: the person fetches the part from its station and assembles it, from either station.
 #[test]
 fn a_person_assembles_alone() {
