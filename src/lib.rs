@@ -1,4 +1,10 @@
-//! Tandem, the workcell controller.
+//! Tandem, a zero-copy realtime controller for human-robot assembly workcells.
+//!
+//! ARCHITECTURE.md says how the parts hang together; each module's first lines
+//! say what it decides and what never happens in it.
+
+pub mod learning;
+pub mod perception;
 pub mod plant;
 pub mod strategy;
 pub mod supervisor;

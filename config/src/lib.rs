@@ -38,8 +38,6 @@ pub use plant::Plant;
 pub use pose::{isometry_of, pose_of};
 pub use product::{Capture, Part, Product};
 pub use robot::{LinkInertia, Robot, RobotOptions};
-pub use strategy::{
-    AssemblyMode, Focus, Form, Range, ReferenceRow, Step, StrategyRow, Subject, Verb,
-};
+pub use strategy::{AssemblyMode, Focus, Form, Range, ReferenceRow, Step, StrategyRow, Subject, Verb};
 pub use supervisor::{Capability, Supervisor, Timeouts};
 pub use timing::{Policy, Realtime, Schedule, Timing};

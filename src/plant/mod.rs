@@ -23,12 +23,17 @@ use rand_distr::{Distribution, StandardNormal};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{ColliderBuilder, PhysicsWorld};
 use tandem_config::Cell;
-use tandem_msg::{CellRequest, CellState, HumanState, JointCommand, JointState, OperatorEvent, Prompt, Stamp};
+use tandem_msg::{
+    CellRequest, CellState, EffectorCommand, HumanState, JointCommand, JointState, OperatorEvent, PlantFault,
+    PointCloud, Prompt, Stamp,
+};
 
 mod arm;
+pub mod camera;
 mod drive;
 mod dynamics;
 mod effector;
+mod eye;
 mod figure;
 mod frames;
 mod glide;
@@ -36,6 +41,7 @@ mod human;
 mod model;
 mod parts;
 mod referee;
+pub mod solid;
 mod station;
 mod tracker;
 
@@ -45,6 +51,7 @@ mod tests;
 use arm::{Arm, GRAVITY};
 use drive::Drive;
 use effector::{Effector, Reach};
+use eye::Eye;
 use human::{Person, Sight};
 use model::PlantModel;
 use parts::Parts;
@@ -87,6 +94,7 @@ pub struct Plant {
     feeder: Feeder,
     person: Person,
     tracker: Tracker,
+    eye: Eye,
     referee: Referee,
     noise: ChaCha8Rng,
     luck: ChaCha8Rng,
@@ -94,6 +102,13 @@ pub struct Plant {
     period: Duration,
     loaded: Option<usize>,
     base_from_tcp: Isometry3<f64>,
+}
+
+/// Random numbers of one organ of the plant; organs do not disturb each other's.
+fn stream(seed: u64, organ: u64) -> ChaCha8Rng {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(organ);
+    random
 }
 
 /// Why a plant cannot be built.
@@ -122,10 +137,10 @@ impl Plant {
     /// An arm that cannot rest where its configuration says.
     pub fn new(cell: &Cell, seed: u64) -> Result<Self, PlantError> {
         let robot = model::robot(cell)?;
-        Ok(Self::of(PlantModel::of(cell, &robot), seed))
+        Ok(Self::of(PlantModel::of(cell, &robot), Eye::new(cell, stream(seed, 5)), seed))
     }
 
-    fn of(model: PlantModel, seed: u64) -> Self {
+    fn of(model: PlantModel, eye: Eye, seed: u64) -> Self {
         let mut world = PhysicsWorld::new();
         world.gravity = Vector::new(0.0, 0.0, -GRAVITY);
         world.integration_parameters.dt = model.period.as_secs_f64();
@@ -136,11 +151,6 @@ impl Plant {
             let pose = frames::body_pose(&object.base_from_object);
             world.insert_collider(ColliderBuilder::cuboid(x, y, z).position(pose).friction(0.6), None);
         }
-        let stream = |stream| {
-            let mut random = ChaCha8Rng::seed_from_u64(seed);
-            random.set_stream(stream);
-            random
-        };
         let parts = Parts::new(model.parts, &mut world);
         let drive = Drive::new(&model.arm.joints, &model.arm.home, model.config_hash);
         let arm = Arm::new(model.arm, &mut world);
@@ -149,10 +159,11 @@ impl Plant {
             base_from_tcp: arm.base_from_tcp(),
             effector: Effector::new(model.effector),
             feeder: Feeder::new(model.feeder),
-            person: Person::new(model.person, stream(1)),
-            tracker: Tracker::new(model.tracking_sigma, stream(2)),
-            noise: stream(3),
-            luck: stream(4),
+            person: Person::new(model.person, stream(seed, 1)),
+            tracker: Tracker::new(model.tracking_sigma, stream(seed, 2)),
+            eye,
+            noise: stream(seed, 3),
+            luck: stream(seed, 4),
             joint_noise: model.joint_noise,
             period: model.period,
             loaded: None,
@@ -180,7 +191,10 @@ impl Plant {
         };
         self.person.cycle(now, dt, inputs.prompt, &sight, &mut self.parts, &mut self.world);
         let reach = Reach { base_from_tcp: &self.base_from_tcp, tcp_velocity, hand_on: self.person.hand_on() };
-        self.effector.cycle(now, &inputs.command.effector, &reach, &mut self.parts, &mut self.world);
+        // A tool obeys nobody whom the drives do not obey; what it has begun, it finishes.
+        let heeded = self.drive.fault() == PlantFault::None;
+        let command = if heeded { inputs.command.effector } else { EffectorCommand::default() };
+        self.effector.cycle(now, &command, &reach, &mut self.parts, &mut self.world);
         self.load_arm();
         self.referee.cycle(
             now,
@@ -194,6 +208,12 @@ impl Plant {
             &self.parts,
         );
         self.tell(now, outputs);
+    }
+
+    /// The picture that was due: the presented part as the camera sees it. Leaves the header alone.
+    pub fn scan(&mut self, cloud: &mut PointCloud) {
+        let part = self.feeder.presented().map(|part| (part, self.parts.base_from_part(part)));
+        self.eye.scan(part, self.feeder.scan_request(), cloud);
     }
 
     fn move_arm(&mut self, now: Stamp, dt: f64, command: &JointCommand, outputs: &mut PlantOutputs) {

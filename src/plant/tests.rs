@@ -313,6 +313,8 @@ fn a_bad_command_never_moves_the_arm() {
         let before = rig.out.arm.position;
         let good = rig.command;
         spoil(&mut rig.command);
+        rig.command.effector.id += 1;
+        rig.command.effector.action = EffectorAction::Release.into();
         rig.command.valid_until = rig.now.after(Duration::from_secs(1));
         rig.command.header.seq += 1;
         for _ in 0..100 {
@@ -322,6 +324,7 @@ fn a_bad_command_never_moves_the_arm() {
         for (now, before) in rig.out.arm.position.iter().zip(before) {
             assert!((now - before).abs() < 1e-3, "{name}: {now} {before}");
         }
+        assert_eq!(rig.out.arm.effector.command_id, 0, "{name}: nor does it move the tool");
         rig.command = JointCommand { header: rig.command.header, ..good };
         rig.cycles(2);
         assert!(rig.out.arm.fault.is(PlantFault::None), "{name}: a good command opens the brakes");
@@ -454,6 +457,23 @@ fn the_feeder_answers_every_request() {
     assert_eq!(rig.ask(RequestKind::NewBox, 0), Some(RequestPhase::Served));
     assert_eq!(rig.out.cell.parts_seated, 0);
     assert_eq!(rig.ask(RequestKind::Present, 0), Some(RequestPhase::Served));
+}
+
+/// A scan shows the part that is there, to the request that asked for it, and nothing when none is.
+#[test]
+fn the_camera_sees_the_presented_part() {
+    let mut rig = Rig::new(9);
+    let mut cloud = Box::new(PointCloud::default());
+    rig.plant.scan(&mut cloud);
+    assert_eq!((cloud.request, cloud.point_count), (0, 0));
+    for part in 0..rig.cell.product.parts.len() {
+        rig.plant.parts.clear(&mut rig.plant.world);
+        assert_eq!(rig.ask(RequestKind::Present, part), Some(RequestPhase::Served));
+        rig.cycles(500);
+        rig.plant.scan(&mut cloud);
+        assert_eq!(cloud.request, rig.request.id);
+        assert!(cloud.point_count > 5_000, "part {part}: {} points", cloud.point_count);
+    }
 }
 
 /// Alone: the person fetches the part from its station and assembles it, from either station.
