@@ -23,6 +23,7 @@ mod child;
 mod error;
 mod health;
 mod journal;
+mod rollcall;
 mod rundir;
 mod shell;
 mod signals;

@@ -1,28 +1,23 @@
 //! The supervisor's loop: hears of its roles, runs the supervisor role, brings the run to its end.
 
-use std::io::Write as _;
 use std::sync::mpsc;
 use std::time::Duration;
 
-use tandem_bus::{Instance, Latest};
+use tandem_bus::{Instance, Node};
 use tandem_config::Cell;
 use tandem_cycle::{FixedRate, Monotonic};
-use tandem_msg::{Coded, Role, RoleStats, Stamp};
+use tandem_msg::{Role, RoleStats, Stamp};
 
 use super::child::{CHILDREN, join};
-use super::health::{Health, Loss, Patience, State};
 use super::journal::Journal;
-use super::warden::{Orders, Report, describe};
+use super::rollcall::RollCall;
+use super::warden::{Orders, Report};
 use super::{LiveError, shell, signals};
 use crate::roles::{SupervisorRole, Surroundings, service};
-use crate::supervisor::{Event, Outcome, RoleFault, RoleHealth, Supervisor};
+use crate::supervisor::{Event, Outcome, Supervisor};
 
-/// Until a role's process has read its files and models and speaks.
-const STARTING: Duration = Duration::from_secs(60);
-/// Between two values of a role on a millisecond grid.
-const SILENCE: Duration = Duration::from_millis(250);
-/// Between two values of perception, which thinks while it is silent.
-const SILENCE_PERCEPTION: Duration = Duration::from_secs(5);
+/// A measured state older than this does not say that the arm stands.
+const FRESH: Duration = Duration::from_millis(250);
 /// From the wish to end until the arm stands.
 const STANDING: Duration = Duration::from_secs(3);
 /// From the wish to end until the journal is durable.
@@ -55,19 +50,6 @@ pub(super) struct Watch<'a> {
     pub(super) events: mpsc::Sender<Event>,
 }
 
-/// The roles as the supervisor's thread sees them, in the order of [`CHILDREN`].
-struct Roles {
-    health: [Health; 3],
-    stats: [Latest<RoleStats>; 3],
-    /// All were up at once.
-    ready: bool,
-    restarts: u32,
-    /// What was said at the last loss.
-    last_words: String,
-    /// A role that will not come back.
-    given_up: Option<(Role, Loss)>,
-}
-
 /// What has been decided about the end, and since when.
 #[derive(Clone, Debug)]
 struct Ending {
@@ -84,7 +66,7 @@ impl Watch<'_> {
         let [plant, perception, controller] = CHILDREN;
         let stats = |role| node.latest(&service::stats(role));
         let stats = [stats(plant)?, stats(perception)?, stats(controller)?];
-        let mut roles = Roles::new(stats, self.cell);
+        let mut roles = RollCall::new(stats, self.cell);
 
         let granted = shell::granted(self.cell, Role::Supervisor)?;
         shell::tell(Role::Supervisor, &granted);
@@ -96,7 +78,7 @@ impl Watch<'_> {
         loop {
             let now = rate.wait().now;
             let start = *start.get_or_insert(now);
-            roles.hear(&self.reports, &role.heard(), self.orders);
+            roles.call(now, &self.reports, &role.heard(), self.orders);
             if let Some(error) = roles.failed_to_start() {
                 return Err(error);
             }
@@ -117,7 +99,7 @@ impl Watch<'_> {
             if let Some(outcome) = outputs.finished.take() {
                 ending.get_or_insert(Ending { outcome, since: now });
             } else if ending.is_none() {
-                ending = overdue(now, asked_since, &mut roles).map(|outcome| Ending { outcome, since: now });
+                ending = overdue(now, asked_since, &roles).map(|outcome| Ending { outcome, since: now });
             }
             let _ = own_stats.publish(now, &shell::stats(Role::Supervisor, &rate, &granted));
             if let Some(end) = &ending
@@ -125,16 +107,16 @@ impl Watch<'_> {
             {
                 let loops = roles.loops(shell::stats(Role::Supervisor, &rate, &granted));
                 let time_s = now.as_secs_f64() - start.as_secs_f64();
-                return Ok(Ended { outcome: end.outcome.clone(), time_s, loops, restarts: roles.restarts });
+                return Ok(Ended { outcome: end.outcome.clone(), time_s, loops, restarts: roles.restarts() });
             }
         }
     }
 
     /// Whether the arm stands and the journal is durable, or they have had their time.
-    fn may_leave(&self, now: Stamp, end: &Ending, role: &SupervisorRole<tandem_bus::Node>) -> bool {
+    fn may_leave(&self, now: Stamp, end: &Ending, role: &SupervisorRole<Node>) -> bool {
         let waited = end.since.age_at(now);
         let arm = role.arm();
-        let fresh = arm.header.heard() && arm.header.stamp.age_at(now) < SILENCE;
+        let fresh = arm.header.heard() && arm.header.stamp.age_at(now) < FRESH;
         let stands = fresh && arm.velocity.iter().all(|velocity| velocity.abs() < STANDSTILL);
         let settled = self.journal.is_settled();
         // The second signal is for those who cannot wait.
@@ -143,23 +125,10 @@ impl Watch<'_> {
 }
 
 /// The outcome the shell decides on when the supervisor role has not, in its time.
-fn overdue(now: Stamp, asked_since: Option<Stamp>, roles: &mut Roles) -> Option<Outcome> {
+fn overdue(now: Stamp, asked_since: Option<Stamp>, roles: &RollCall) -> Option<Outcome> {
     if signals::asked() > 1 || asked_since.is_some_and(|since| since.age_at(now) > YIELDING) {
         return Some(Outcome::Interrupted);
     }
-    let (role, loss, since) = roles.gone_since(now)?;
-    (since.age_at(now) > YIELDING).then(|| Outcome::Fault { role: role.name(), fault: describe(role, loss) })
-}
-
-impl Roles {
-    fn new(stats: [Latest<RoleStats>; 3], cell: &Cell) -> Self {
-        let period = cell.timing.of(Role::Supervisor).period;
-        let health = CHILDREN.map(|role| {
-            let silence = if role == Role::Perception { SILENCE_PERCEPTION } else { SILENCE };
-            // A slow grid is not silence.
-            let silence = silence.max(cell.timing.of(role).period * 10);
-            Health::new(Patience::new(silence, STARTING, period))
-        });
-        Self { health, stats, ready: false, restarts: 0, last_words: String::new(), given_up: None, gone_since: None }
-    }
+    let (role, fault, since) = roles.gone()?;
+    (since.age_at(now) > YIELDING).then(|| Outcome::Fault { role, fault })
 }
