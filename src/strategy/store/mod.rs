@@ -18,7 +18,7 @@ mod url;
 
 pub use error::StoreError;
 pub use history::PastRun;
-pub use journal::RunRecord;
+pub use journal::{PastRun, RunRecord};
 pub use url::{default_url, shown};
 
 use super::{JournalEntry, Library};
@@ -45,7 +45,7 @@ pub struct Store {
 impl Store {
     /// Opens the database at `url`, brings its tables up to date and makes the library
     /// hold `seeds`: rows that came from strategy files before are replaced by these,
-    /// rows of other origin stay.
+    /// rows of other origin stay. Without seeds the library stays as it is.
     ///
     /// # Errors
     /// The database cannot be reached or created, its tables cannot be brought up to date,
@@ -105,6 +105,14 @@ impl Store {
     /// or a number is not finite (then nothing was written).
     pub fn append(&self, entries: &[JournalEntry]) -> Result<(), StoreError> {
         self.run("write the journal", journal::append(&self.pool, entries))
+    }
+
+    /// Every run that was recorded, the oldest first.
+    ///
+    /// # Errors
+    /// The database does not answer.
+    pub fn runs(&self) -> Result<Vec<PastRun>, StoreError> {
+        self.run("read the runs", journal::runs(&self.pool))
     }
 
     /// The journal of one run, in the order in which it was written.
