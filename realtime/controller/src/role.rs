@@ -548,7 +548,7 @@ impl Controller {
                 causes.add(StopCause::Separation);
             }
         }
-        self.governor.choose(now, person, gradient, !moving)
+        self.governor.choose(now, person, gradient, state.velocity, self.required)
     }
 
     fn person(&self, now: Stamp) -> Person {
