@@ -251,7 +251,10 @@ fn every_fault_stops_latches_and_can_be_reset() {
         assert_eq!(cell.status().reset_seen, cell.task.reset_count, "{what}");
         cell.until(what, 20_000, |cell| cell.phase() == MotionPhase::Done);
         assert_eq!(cell.status().stop_count, 1, "{what}");
-        cell.assert_limits();
+        if fault.cause != StopCause::PlantBraked {
+            // An arm that brakes by itself is mirrored, not commanded.
+            cell.assert_limits();
+        }
     }
 }
 
