@@ -2,12 +2,12 @@
 
 use tandem_bus::{Read, Write};
 use tandem_msg::{
-    CellRequest, CellState, Feature, HumanState, JointState, MotionStatus, MotionTask, OperatorEvent, Prompt, Scene,
+    CellRequest, CellState, Feature, Header, HumanState, JointState, MotionStatus, MotionTask, OperatorEvent, Prompt, Scene,
     Stamp,
 };
 
 use super::{Ports, service};
-use crate::supervisor::{RoleHealth, Supervisor, SupervisorInputs, SupervisorOutputs};
+use crate::supervisor::{RoleHealth, Summary, Supervisor, SupervisorInputs, SupervisorOutputs};
 
 /// The supervisor with its ports.
 pub struct SupervisorRole<P: Ports> {
@@ -83,9 +83,19 @@ impl<P: Ports> SupervisorRole<P> {
         &mut self.outputs
     }
 
-    /// The last measured state of each role's own stream: plant, perception, controller.
-    pub fn heard(&self) -> [Stamp; 3] {
-        [self.arm.held().header.stamp, self.feature.held().header.stamp, self.status.held().header.stamp]
+    /// Header of the last value heard of each other role: plant, perception, controller.
+    pub fn heard(&self) -> [Header; 3] {
+        [self.arm.held().header, self.feature.held().header, self.status.held().header]
+    }
+
+    /// The measured state of the arm as it was last read.
+    pub fn arm(&self) -> &JointState {
+        self.arm.held()
+    }
+
+    /// The numbers of the run so far.
+    pub fn summary(&self) -> Summary {
+        self.supervisor.summary()
     }
 
     /// Messages that reached nobody because the bus had no room.

@@ -27,7 +27,11 @@ fn no_file_names_a_folder_of_one_machine() {
     for ending in [".rs", ".toml", ".md", ".json", ".urdf", "run"] {
         for path in files(root(), ending) {
             let source = text(&path);
-            assert!(!source.contains(&home) && !source.contains(&shared), "{}: names a folder of one machine", shown(&path));
+            assert!(
+                !source.contains(&home) && !source.contains(&shared),
+                "{}: names a folder of one machine",
+                shown(&path)
+            );
         }
     }
 }

@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::Near;
+use super::{Near, TOUCHING};
 
 /// A box somewhere in the base frame.
 #[derive(Clone, Copy, Debug)]
@@ -88,7 +88,7 @@ fn segment_to_box(segment: &[Vector3<f64>; 2], half: &Vector3<f64>) -> Near {
     let on_first = start + along * t;
     let on_second = clamp(&on_first, half);
     let distance = (on_first - on_second).norm();
-    if distance > 0.0 {
+    if distance > TOUCHING {
         return Near { distance, on_first, on_second };
     }
     let (depth, way_out) = depth_in_box(segment, half);

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::Near;
+use super::{Near, TOUCHING};
 
 /// Steps of the root search; every fourth halves the bracket, and in practice ten do.
 const STEPS: u32 = 80;
@@ -62,7 +62,7 @@ pub(crate) fn segment_to_cylinder(segment: &[Vector3<f64>; 2], radius: f64, half
     let on_first = start + along * t;
     let on_second = nearest(&on_first);
     let squared = (on_first - on_second).norm_squared();
-    if squared > open {
+    if squared > open + TOUCHING * TOUCHING {
         return Near { distance: (squared - open).sqrt(), on_first, on_second };
     }
     let (depth, way_out) = depth_in_cylinder(segment, radius, half_length);

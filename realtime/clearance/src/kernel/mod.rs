@@ -14,6 +14,9 @@ pub(crate) use segment::{point_to_segment, segment_to_segment};
 
 use nalgebra::Vector3;
 
+/// Cores nearer than this, metres, touch: what is left is rounding.
+const TOUCHING: f64 = 1e-12;
+
 /// The nearest points of two cores and their signed distance, metres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Near {
@@ -38,7 +41,7 @@ impl Near {
 
     /// Between the surfaces, when the cores are padded by these radii.
     pub(crate) fn padded(self, first: f64, second: f64) -> Self {
-        let towards = if self.distance.abs() > 1e-12 {
+        let towards = if self.distance.abs() > TOUCHING {
             (self.on_second - self.on_first) / self.distance
         } else {
             Vector3::zeros()

@@ -1,0 +1,18 @@
+//! Training of the encoder and both decoders on generated parts.
+//!
+//! [`Specimen`] draws parts and views, [`example`] scans them with the plant's depth
+//! camera and samples the clouds exactly as perception does, [`train`] fits the network
+//! and measures it on parts it never saw.
+
+mod adam;
+mod augment;
+mod dataset;
+mod loss;
+mod parameters;
+mod report;
+mod specimen;
+mod train;
+
+pub use dataset::{Example, Split, example};
+pub use specimen::Specimen;
+pub use train::{TrainError, TrainOptions, TrainProgress, train};

@@ -1,0 +1,3 @@
+//! What is learned before a cell runs.
+
+pub mod encoder;
