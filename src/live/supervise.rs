@@ -3,7 +3,7 @@
 use std::sync::mpsc;
 use std::time::Duration;
 
-use tandem_bus::{Instance, Node};
+use tandem_bus::{Instance, Node, Write as _};
 use tandem_config::Cell;
 use tandem_cycle::{FixedRate, Monotonic};
 use tandem_msg::{Role, RoleStats, Stamp};
@@ -130,5 +130,5 @@ fn overdue(now: Stamp, asked_since: Option<Stamp>, roles: &RollCall) -> Option<O
         return Some(Outcome::Interrupted);
     }
     let (role, fault, since) = roles.gone()?;
-    (since.age_at(now) > YIELDING).then(|| Outcome::Fault { role, fault })
+    (since.age_at(now) > YIELDING).then_some(Outcome::Fault { role, fault })
 }
