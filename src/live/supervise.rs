@@ -133,5 +133,5 @@ fn overdue(now: Stamp, asked_since: Option<Stamp>, roles: &RollCall) -> Option<O
         return Some(Outcome::Interrupted);
     }
     let (role, fault, since) = roles.gone()?;
-    (since.age_at(now) > YIELDING).then(|| Outcome::Fault { role, fault })
+    (since.age_at(now) > YIELDING).then_some(Outcome::Fault { role, fault })
 }
