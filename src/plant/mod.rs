@@ -34,16 +34,13 @@ mod drive;
 mod dynamics;
 mod effector;
 mod eye;
-mod figure;
 mod frames;
-mod glide;
 mod human;
 mod model;
 mod parts;
 mod referee;
 pub mod solid;
 mod station;
-mod tracker;
 
 #[cfg(test)]
 mod tests;
@@ -52,12 +49,11 @@ use arm::{Arm, GRAVITY};
 use drive::Drive;
 use effector::{Effector, Reach};
 use eye::Eye;
-use human::{Person, Sight};
+use human::{Person, Sight, Tracker};
 use model::PlantModel;
 use parts::Parts;
 use referee::{Look, Referee};
 use station::Feeder;
-use tracker::Tracker;
 
 /// What the plant hears in a cycle: the latest of each.
 pub struct PlantInputs<'a> {

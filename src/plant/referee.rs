@@ -20,8 +20,8 @@ use rapier3d_f64::parry::query::intersection_test;
 use rapier3d_f64::parry::shape::{Capsule, Cuboid, Shape};
 use tandem_msg::Stamp;
 
-use super::figure::{CAPSULES, Limb};
 use super::frames::{apart, body_pose, vector};
+use super::human::{CAPSULES, Limb};
 use super::parts::{Block, Parts, Place};
 
 /// Time between two looks.
