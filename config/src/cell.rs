@@ -90,18 +90,11 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     let supervisor = Supervisor::read(&root);
     let store = read_store(&root);
     let robot_file = root.text("robot").map(|file| beside(folder, &file));
-    let product = layout
-        .as_ref()
-        .and_then(|layout| read_product(&root, product, folder, layout, reading));
+    let product = layout.as_ref().and_then(|layout| read_product(&root, product, folder, layout, reading));
     let (mut reference, mut strategies) = (Vec::new(), Vec::new());
     for file in root.texts("strategies") {
         let file = beside(folder, &file);
-        let asked = root.fault_at(
-            "strategies",
-            &format!("\"{}\"", file.display()),
-            "a strategy file",
-            "",
-        );
+        let asked = root.fault_at("strategies", &format!("\"{}\"", file.display()), "a strategy file", "");
         let Some(document) = reading.open(&file, Some(asked)) else {
             continue;
         };
@@ -113,17 +106,8 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         strategies.extend(strategy::read_strategies(&table));
     }
     if reference.is_empty() || strategies.is_empty() {
-        let found = format!(
-            "{} reference rows, {} strategies",
-            reference.len(),
-            strategies.len()
-        );
-        root.refuse(
-            "strategies",
-            &found,
-            "at least one of each",
-            "list the files of config/strategies",
-        );
+        let found = format!("{} reference rows, {} strategies", reference.len(), strategies.len());
+        root.refuse("strategies", &found, "at least one of each", "list the files of config/strategies");
     }
 
     Some(Cell {
@@ -151,18 +135,10 @@ fn read_store(root: &Table<'_>) -> Store {
     }
     let url = root.table("store").and_then(|table| {
         let url = table.text_if("url")?;
-        if !["sqlite:", "mysql:", "mariadb:"]
-            .iter()
-            .any(|scheme| url.starts_with(scheme))
-        {
+        if !["sqlite:", "mysql:", "mariadb:"].iter().any(|scheme| url.starts_with(scheme)) {
             let scheme = url.split(':').next().unwrap_or_default();
             let advice = "write sqlite://FILE or mysql://USER@HOST/DATABASE";
-            table.refuse(
-                "url",
-                &format!("\"{scheme}:…\""),
-                "sqlite:, mysql: or mariadb:",
-                advice,
-            );
+            table.refuse("url", &format!("\"{scheme}:…\""), "sqlite:, mysql: or mariadb:", advice);
         }
         Some(url)
     });
@@ -176,20 +152,12 @@ fn read_product(
     layout: &Layout,
     reading: &Reading,
 ) -> Option<Product> {
-    let products = root
-        .text("products")
-        .map(|products| beside(folder, &products));
+    let products = root.text("products").map(|products| beside(folder, &products));
     let named = root.text("product");
     let name = chosen.map(str::to_owned).or(named)?;
-    let file = if name.ends_with(".toml") {
-        PathBuf::from(&name)
-    } else {
-        products?.join(format!("{name}.toml"))
-    };
+    let file = if name.ends_with(".toml") { PathBuf::from(&name) } else { products?.join(format!("{name}.toml")) };
     let found = format!("\"{name}\"");
-    let asked = chosen
-        .is_none()
-        .then(|| root.fault_at("product", &found, "a product of the products folder", ""));
+    let asked = chosen.is_none().then(|| root.fault_at("product", &found, "a product of the products folder", ""));
     let document = reading.open(&file, asked)?;
     let parsed = document.parse(reading);
     let table = document.root(reading, &parsed);
@@ -197,10 +165,7 @@ fn read_product(
     let properties = table.text("properties").and_then(|properties| {
         let properties = beside(folder, &properties);
         let found = format!("\"{}\"", properties.display());
-        reading.open(
-            &properties,
-            Some(table.fault_at("properties", &found, "a JSON file", "")),
-        )
+        reading.open(&properties, Some(table.fault_at("properties", &found, "a JSON file", "")))
     });
     Some(product::read(&table, properties.as_ref(), layout, reading))
 }
@@ -210,9 +175,7 @@ pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
     let mut out = PathBuf::new();
     for component in folder.join(written).components() {
         match component {
-            Component::ParentDir
-                if matches!(out.components().next_back(), Some(Component::Normal(_))) =>
-            {
+            Component::ParentDir if matches!(out.components().next_back(), Some(Component::Normal(_))) => {
                 out.pop();
             }
             Component::CurDir => {}

@@ -4,6 +4,7 @@
 //! a closure. What is the same is here: the grid, the record of the loop, the
 //! report on it ten times a second, and when to leave.
 
+use std::io::{self, Write as _};
 use std::time::Duration;
 
 use rustix::process::{Pid, getppid};
@@ -11,7 +12,7 @@ use tandem_bus::Publisher;
 use tandem_cycle::setup::{self, Granted, Wish};
 use tandem_cycle::{FixedRate, Grid, Monotonic};
 use tandem_config::{Cell, Policy, Schedule};
-use tandem_msg::{Role, RoleStats, Stamp};
+use tandem_msg::{Coded, Role, RoleStats, Stamp};
 
 use super::{LiveError, signals};
 
@@ -42,6 +43,7 @@ impl Shell {
     pub(super) fn new(cell: &Cell, role: Role, stats: Publisher<RoleStats>) -> Result<Self, LiveError> {
         let grid = grid(cell.timing.of(role), role)?;
         let granted = granted(cell, role)?;
+        tell(role, &granted);
         let rate = FixedRate::new(grid, Monotonic);
         Ok(Self { role, rate, granted, stats, report_at: Stamp(0), parent: getppid() })
     }
@@ -86,6 +88,18 @@ pub(super) fn granted(cell: &Cell, role: Role) -> Result<Granted, LiveError> {
         lock_memory: priority.is_some() && role != Role::Supervisor,
     };
     setup::acquire(&wish).map_err(|denied| LiveError::Denied { role, denied })
+}
+
+/// Says on standard error what is degraded, and how to mend it.
+pub(super) fn tell(role: Role, granted: &Granted) {
+    for notice in granted.notices.iter() {
+        // Standard error may be closed; `tandem doctor` says the same.
+        let _ = match role {
+            // A role's own lines are marked by the parent.
+            Role::Supervisor => writeln!(io::stderr(), "{}: {notice}", role.name()),
+            _ => writeln!(io::stderr(), "{notice}"),
+        };
+    }
 }
 
 /// The report on a loop.

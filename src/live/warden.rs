@@ -36,6 +36,9 @@ const CLEANING: Duration = Duration::from_millis(500);
 /// Between asking a process to end and killing it.
 const GRACE: Duration = Duration::from_secs(2);
 
+/// Exit code of a process that refuses its configuration; see [`super::LiveError::exit_code`].
+const CONFIG_REFUSED: i32 = 3;
+
 /// What the warden tells the supervisor.
 #[derive(Debug)]
 pub(super) enum Report {
@@ -59,8 +62,6 @@ pub(super) enum Report {
     GivenUp {
         /// The role.
         role: Role,
-        /// How often it was restarted.
-        restarts: u32,
     },
 }
 
@@ -174,7 +175,7 @@ impl Warden {
                 Err(cause) => {
                     let last_words = format!("its process could not be started: {cause}");
                     let _ = self.reports.send(Report::Lost { role, loss: Loss::NeverReady, last_words });
-                    let _ = self.reports.send(Report::GivenUp { role, restarts: place.restarts });
+                    let _ = self.reports.send(Report::GivenUp { role });
                 }
             }
         }
@@ -228,8 +229,10 @@ impl Warden {
             let _ = self.reports.send(Report::Lost { role, loss, last_words: words.read() });
             self.instance.clean_dead(CLEANING);
             let place = &mut self.places[index];
-            if role == Role::Plant || place.restarts >= RESTARTS_MAX {
-                let _ = self.reports.send(Report::GivenUp { role, restarts: place.restarts });
+            // A file or setting that was refused will be refused again.
+            let refused = loss == Loss::Exited { code: CONFIG_REFUSED };
+            if role == Role::Plant || refused || place.restarts >= RESTARTS_MAX {
+                let _ = self.reports.send(Report::GivenUp { role });
             } else {
                 place.start_at = Some(Instant::now() + pause(place.restarts));
                 place.restarts += 1;

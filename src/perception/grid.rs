@@ -56,45 +56,47 @@ impl Grid {
         debug_assert!(radius <= 0.5 * WIDTH);
         let low = p.map(|v| axis(v - radius));
         let high = p.map(|v| axis(v + radius));
-        let (mut count, mut sum, mut products) = (0_u32, [0.0_f32; 3], [0.0_f32; 6]);
-        for x in low[0]..=high[0] {
-            for y in low[1]..=high[1] {
-                for z in low[2]..=high[2] {
-                    let cell = index([x, y, z]) as usize;
-                    for &i in &self.members[self.start[cell] as usize..self.start[cell + 1] as usize] {
-                        let d = sub(points[usize::from(i)], p);
-                        if squared(d) < radius * radius {
-                            count += 1;
-                            for k in 0..3 {
-                                sum[k] += d[k];
-                                products[k] += d[k] * d[k];
-                                products[k + 3] += d[k] * d[(k + 1) % 3];
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        let cells = (low[0]..=high[0])
+            .flat_map(|x| (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| index([x, y, z]) as usize)));
+        let members =
+            cells.flat_map(|cell| &self.members[self.start[cell] as usize..self.start[cell + 1] as usize]);
+        let near = members.map(|&i| sub(points[usize::from(i)], p)).filter(|d| squared(*d) < radius * radius);
+        let (count, _, covariance) = moments(near);
         let back = 1.0 / squared(towards).sqrt().max(1e-9);
         let towards = towards.map(|v| v * back);
         if count < NEIGHBOURS_MIN {
             return (towards, 0.0);
-        }
-        let share = 1.0 / count as f32;
-        let mean = sum.map(|s| s * share);
-        let mut covariance = [0.0; 6];
-        for k in 0..3 {
-            covariance[k] = products[k] * share - mean[k] * mean[k];
-            covariance[k + 3] = products[k + 3] * share - mean[k] * mean[(k + 1) % 3];
         }
         let (normal, roughness) = smallest_axis(covariance);
         if dot(normal, towards) < 0.0 { (normal.map(|v| -v), roughness) } else { (normal, roughness) }
     }
 }
 
+/// Count, mean and covariance (xx, yy, zz, xy, yz, zx) of points.
+#[inline]
+pub(crate) fn moments(points: impl Iterator<Item = [f32; 3]>) -> (u32, [f32; 3], [f32; 6]) {
+    let (mut count, mut sum, mut products) = (0_u32, [0.0_f32; 3], [0.0_f32; 6]);
+    for d in points {
+        count += 1;
+        for k in 0..3 {
+            sum[k] += d[k];
+            products[k] += d[k] * d[k];
+            products[k + 3] += d[k] * d[(k + 1) % 3];
+        }
+    }
+    let share = 1.0 / count.max(1) as f32;
+    let mean = sum.map(|s| s * share);
+    let mut covariance = [0.0; 6];
+    for k in 0..3 {
+        covariance[k] = products[k] * share - mean[k] * mean[k];
+        covariance[k + 3] = products[k + 3] * share - mean[k] * mean[(k + 1) % 3];
+    }
+    (count, mean, covariance)
+}
+
 /// Direction of least variance of a covariance (xx, yy, zz, xy, yz, zx), and that variance's
 /// share of the whole. Eigenvalue in closed form, eigenvector as the best of three cross products.
-fn smallest_axis(c: [f32; 6]) -> ([f32; 3], f32) {
+pub(crate) fn smallest_axis(c: [f32; 6]) -> ([f32; 3], f32) {
     let trace = c[0] + c[1] + c[2];
     if trace <= 1e-12 {
         return ([0.0, 0.0, 1.0], 0.0);

@@ -2,8 +2,10 @@
 //!
 //! 1. Centre on the median and scale by the 95 % quantile of the radius, so that stray
 //!    points do not set the scale.
-//! 2. Find the dominant plane. Most of a scan is flat surface that says little: at least
-//!    [`OFF_PLANE`] of the points kept lie off it, where the scan has that many.
+//! 2. Find the dominant plane and turn the cloud so that its normal, on the camera's side,
+//!    is z: heights over it and slopes against it tell features apart wherever the camera
+//!    stood. Most of a scan is flat surface that says little: at least [`OFF_PLANE`] of the
+//!    points kept lie off that plane, where the scan has as many.
 //! 3. Keep 512 points by farthest-point sampling that favours the middle of the view.
 //! 4. Give each its normal and roughness from all scanned points around it: threads
 //!    are smaller than the spacing of 512 points and would be lost otherwise.
@@ -15,7 +17,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
-use super::grid::Grid;
+use super::grid::{Grid, moments, smallest_axis};
 
 /// Points the network reads.
 pub const POINTS: usize = 512;
@@ -32,6 +34,8 @@ const OFF_PLANE: usize = 336;
 const CANDIDATES: [usize; 2] = [1536, 512];
 /// Half thickness of the dominant plane, in scaled units.
 const PLANE_BAND: f32 = 0.02;
+/// Points that vote on the dominant plane.
+const VOTERS: usize = 768;
 /// Plane hypotheses tried.
 const HYPOTHESES: usize = 64;
 /// Radius of the neighbourhood that normal and roughness are taken from, in scaled units.
@@ -46,7 +50,10 @@ pub struct Sample {
     pub centre: [f32; 3],
     /// Metres a scaled unit.
     pub scale: f32,
-    /// Points: [`POINTS`] × (place scaled, normal towards the camera, roughness).
+    /// Rotation from the camera frame into the sample's, by rows: z is the normal of the
+    /// dominant plane.
+    pub turn: [[f32; 3]; 3],
+    /// Points: [`POINTS`] × (place turned and scaled, normal towards the camera, roughness).
     pub points: Vec<[f32; CHANNELS]>,
     /// Index of each in the cloud.
     pub source: Vec<u16>,
@@ -56,6 +63,14 @@ pub struct Sample {
     pub groups: Vec<[u16; NEIGHBOURS]>,
     /// The centre (index into `centres`) nearest to each point.
     pub home: Vec<u16>,
+}
+
+impl Sample {
+    /// Normal of a sampled point in the camera frame, towards the camera.
+    pub fn normal_in_camera(&self, index: usize) -> [f32; 3] {
+        let p = &self.points[index];
+        [0, 1, 2].map(|c| self.turn[0][c] * p[3] + self.turn[1][c] * p[4] + self.turn[2][c] * p[5])
+    }
 }
 
 /// Room for sampling, kept between clouds.
@@ -87,11 +102,15 @@ impl Sampler {
         }
         self.shuffle(cloud.len());
         let (centre, scale) = self.normalise(cloud)?;
-        let plane = self.dominant_plane();
-        let kept = self.choose(&plane);
+        let (normal, offset) = self.dominant_plane(centre);
+        let turn = upright(normal);
+        for p in &mut self.scaled {
+            *p = turned(&turn, *p);
+        }
+        let kept = self.choose(offset);
 
         self.grid.fill(&self.scaled);
-        let to_camera = centre.map(|c| -c / scale);
+        let to_camera = turned(&turn, centre.map(|c| -c / scale));
         let points: Vec<[f32; CHANNELS]> = kept
             .iter()
             .map(|&i| {
@@ -102,7 +121,7 @@ impl Sampler {
             })
             .collect();
         let (centres, groups, home) = group(&points);
-        Some(Sample { centre, scale, points, source: kept, centres, groups, home })
+        Some(Sample { centre, scale, turn, points, source: kept, centres, groups, home })
     }
 
     /// A fixed pseudo-random order, so that clouds in raster order are sampled evenly too.
@@ -135,35 +154,45 @@ impl Sampler {
         Some((centre, scale))
     }
 
-    /// The plane with most points near it: unit normal and offset.
-    fn dominant_plane(&self) -> ([f32; 3], f32) {
-        let voters = &self.order[..CLOUD_MIN.min(768)];
-        let mut best = (0, [0.0, 0.0, 1.0], 0.0);
+    /// The plane with most points near it: unit normal on the camera's side, and offset.
+    fn dominant_plane(&self, centre: [f32; 3]) -> ([f32; 3], f32) {
+        let place = |i: u16| self.scaled[usize::from(i)];
+        let voters = &self.order[..VOTERS];
+        let mut best = (0, [0.0, 0.0, -1.0], 0.0);
         for h in 0..HYPOTHESES {
-            let corner = |k: usize| self.scaled[usize::from(self.order[(3 * h + k) % self.order.len()])];
-            let (a, b, c) = (corner(0), corner(1), corner(2));
+            let [a, b, c] = [0, 1, 2].map(|k| place(self.order[3 * h + k]));
             let normal = cross(sub(b, a), sub(c, a));
             let length = squared(normal).sqrt();
-            if length < 1e-3 {
+            if length < 1e-2 {
                 continue;
             }
             let normal = normal.map(|v| v / length);
             let offset = dot(normal, a);
-            let near = |i: &&u16| (dot(normal, self.scaled[usize::from(**i)]) - offset).abs() < PLANE_BAND;
-            let votes = voters.iter().filter(near).count();
+            let votes = voters.iter().filter(|i| (dot(normal, place(**i)) - offset).abs() < PLANE_BAND).count();
             if votes > best.0 {
                 best = (votes, normal, offset);
             }
         }
-        (best.1, best.2)
+        let (_, mut normal, mut offset) = best;
+        // Least squares on its voters, twice: three noisy points lean.
+        for _ in 0..2 {
+            let on = voters.iter().map(|i| place(*i)).filter(|p| (dot(normal, *p) - offset).abs() < PLANE_BAND);
+            let (count, mean, covariance) = moments(on);
+            if count < 8 {
+                break;
+            }
+            normal = smallest_axis(covariance).0;
+            offset = dot(normal, mean);
+        }
+        if dot(normal, centre) > 0.0 { (normal.map(|v| -v), -offset) } else { (normal, offset) }
     }
 
     /// Indices of the points kept.
-    fn choose(&self, (normal, offset): &([f32; 3], f32)) -> Vec<u16> {
+    fn choose(&self, offset: f32) -> Vec<u16> {
         let (mut off, mut on) = (Vec::with_capacity(CANDIDATES[0]), Vec::with_capacity(CANDIDATES[0]));
         for &i in &self.order {
             let p = self.scaled[usize::from(i)];
-            let side = if (dot(*normal, p) - offset).abs() > PLANE_BAND { &mut off } else { &mut on };
+            let side = if (p[2] - offset).abs() > PLANE_BAND { &mut off } else { &mut on };
             if side.len() < CANDIDATES[0] {
                 side.push(i);
             }
@@ -249,6 +278,22 @@ fn group(points: &[[f32; CHANNELS]]) -> (Vec<u16>, Vec<[u16; NEIGHBOURS]>, Vec<u
         })
         .collect();
     (centres, groups, home)
+}
+
+/// Rotation that turns the unit vector `z` upright, by the smallest angle; rows.
+fn upright(z: [f32; 3]) -> [[f32; 3]; 3] {
+    // Rodrigues' formula about z × (0, 0, 1), the cosine being z₂.
+    let (x, y, c) = (z[1], -z[0], z[2]);
+    if c < -0.999_999 {
+        return [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
+    }
+    let k = 1.0 / (1.0 + c);
+    [[c + k * x * x, k * x * y, y], [k * x * y, c + k * y * y, -x], [-y, x, c]]
+}
+
+#[inline]
+fn turned(rows: &[[f32; 3]; 3], p: [f32; 3]) -> [f32; 3] {
+    rows.map(|r| dot(r, p))
 }
 
 /// The value below which `share` of the values lie; reorders them.

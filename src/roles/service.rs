@@ -1,5 +1,7 @@
 //! Names of the services of a cell.
 
+use tandem_msg::{Coded, Role};
+
 /// `JointState`, plant to controller and supervisor.
 pub const ARM_STATE: &str = "arm/state";
 /// `JointCommand`, controller to plant.
@@ -24,3 +26,8 @@ pub const PROMPT: &str = "supervisor/prompt";
 pub const REQUEST: &str = "supervisor/request";
 /// `MotionStatus`, controller to supervisor.
 pub const STATUS: &str = "controller/status";
+
+/// `RoleStats`, each role to supervisor: the health of its loop.
+pub fn stats(role: Role) -> String {
+    format!("{}/stats", role.name())
+}

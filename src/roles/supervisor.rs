@@ -2,7 +2,7 @@
 
 use tandem_bus::{Read, Write};
 use tandem_msg::{
-    CellRequest, CellState, Feature, HumanState, JointState, MotionStatus, MotionTask, OperatorEvent, Prompt, Scene,
+    CellRequest, CellState, Feature, Header, HumanState, JointState, MotionStatus, MotionTask, OperatorEvent, Prompt, Scene,
     Stamp,
 };
 
@@ -83,9 +83,14 @@ impl<P: Ports> SupervisorRole<P> {
         &mut self.outputs
     }
 
-    /// The last measured state of each role's own stream: plant, perception, controller.
-    pub fn heard(&self) -> [Stamp; 3] {
-        [self.arm.held().header.stamp, self.feature.held().header.stamp, self.status.held().header.stamp]
+    /// Header of the last value heard of each other role: plant, perception, controller.
+    pub fn heard(&self) -> [Header; 3] {
+        [self.arm.held().header, self.feature.held().header, self.status.held().header]
+    }
+
+    /// The measured state of the arm as it was last read.
+    pub fn arm(&self) -> &JointState {
+        self.arm.held()
     }
 
     /// Messages that reached nobody because the bus had no room.

@@ -3,13 +3,16 @@
 use std::path::Path;
 
 use candle_core::Device;
-use tandem_msg::{Coded, FEATURE_CLASSES};
+use nalgebra::Vector3;
+use tandem_msg::{Coded, FEATURE_CLASSES, FeatureClass, FeatureDimensions};
 
-use super::dataset::Example;
+use super::dataset::{Example, Split, example};
 use super::train::TrainError;
 use crate::perception::card::Metrics;
+use crate::perception::fit::quantile;
 use crate::perception::model::softmax;
 use crate::perception::network::{Input, Network};
+use crate::perception::{Model, Perception, Recognised, Sampler};
 
 /// What a network answers to a set of examples.
 pub(crate) struct Answers {
@@ -80,6 +83,123 @@ pub(crate) fn threshold(answers: &Answers, temperature: f64) -> f64 {
         .unwrap_or(0.99)
 }
 
-pub(crate) fn measure(_folder: &Path, _seed: u64, _count: usize) -> Result<Metrics, TrainError> {
-    Ok(Metrics::default())
+/// Measures the model in a folder on the test split, as it is used in a cell: cloud to feature.
+pub(crate) fn measure(folder: &Path, seed: u64, count: usize) -> Result<Metrics, TrainError> {
+    let mut perception = Perception::load(folder)?;
+    let model = Model::load(folder)?;
+    let threshold = perception.card().threshold;
+    let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
+    let mut tally = Tally::default();
+    for index in 0..count as u64 {
+        let truth = example(seed, Split::Test, index, &mut sampler, &mut cloud);
+        let (Some(answer), Some(recognised)) = (model.answer(&truth.sample), perception.recognise(&cloud)) else {
+            continue;
+        };
+        tally.add(&truth, &answer.segment, &recognised, threshold);
+    }
+    Ok(tally.metrics())
+}
+
+/// Sums over the test split.
+#[derive(Default)]
+struct Tally {
+    count: f64,
+    confusion: [[u32; FEATURE_CLASSES]; FEATURE_CLASSES],
+    sure: f64,
+    sure_right: f64,
+    /// Count, sum of probabilities, right answers, by tenths of probability.
+    bins: [[f64; 3]; 10],
+    points_right: f64,
+    points: f64,
+    ious: Vec<f64>,
+    position: Vec<f64>,
+    axis: Vec<f64>,
+    /// Relative errors of diameter, depth, length, width, pitch.
+    dimensions: [Vec<f64>; 5],
+    threads: f64,
+    pitches: f64,
+}
+
+impl Tally {
+    fn add(&mut self, truth: &Example, segment: &[bool], answer: &Recognised, threshold: f64) {
+        self.count += 1.0;
+        let right = answer.class == truth.class;
+        self.confusion[truth.class.code() as usize][answer.class.code() as usize] += 1;
+        let probability = f64::from(answer.probabilities[answer.class.code() as usize]);
+        let sure = probability >= threshold && answer.fit.is_some();
+        let [n, p, r] = &mut self.bins[((probability * 10.0) as usize).min(9)];
+        *n += 1.0;
+        *p += probability;
+        *r += f64::from(u8::from(right));
+        if sure {
+            self.sure += 1.0;
+            self.sure_right += f64::from(u8::from(right));
+        }
+        let (mut both, mut either) = (0.0, 0.0);
+        for (said, is) in segment.iter().zip(&truth.segment) {
+            self.points += 1.0;
+            self.points_right += f64::from(u8::from(said == is));
+            both += f64::from(u8::from(*said && *is));
+            either += f64::from(u8::from(*said || *is));
+        }
+        if truth.segment.iter().any(|s| *s) {
+            self.ious.push(both / f64::max(either, 1.0));
+        }
+        // Where there is nothing to locate, there is no error of locating it.
+        if let (true, true, Some(fit)) = (right && sure, truth.class != FeatureClass::Other, &answer.fit) {
+            let (is, said) = (&truth.camera_from_feature, &fit.camera_from_feature);
+            self.position.push((is.translation.vector - said.translation.vector).norm());
+            self.axis.push((is * Vector3::z()).angle(&(said * Vector3::z())));
+            self.add_dimensions(truth, &fit.dimensions);
+        }
+    }
+
+    fn add_dimensions(&mut self, truth: &Example, said: &FeatureDimensions) {
+        use FeatureClass as C;
+        let g = &truth.feature;
+        let long = matches!(truth.class, C::Slot | C::Buckle);
+        let threaded = matches!(truth.class, C::ThreadedHole | C::ThreadedAxis);
+        let pairs = [
+            (g.diameter, said.diameter, !long),
+            (g.depth, said.depth, true),
+            (g.length, said.length, long),
+            (g.width, said.width, long),
+            (g.pitch, said.pitch, threaded),
+        ];
+        for ((is, said, applies), errors) in pairs.into_iter().zip(&mut self.dimensions) {
+            if applies && said.value > 0.0 {
+                errors.push((said.value / is - 1.0).abs());
+            }
+        }
+        if threaded {
+            self.threads += 1.0;
+            self.pitches += f64::from(u8::from(said.pitch.value > 0.0));
+        }
+    }
+
+    fn metrics(mut self) -> Metrics {
+        let right: u32 = (0..FEATURE_CLASSES).map(|c| self.confusion[c][c]).sum();
+        let count = self.count.max(1.0);
+        let calibration = self.bins.iter().map(|[_, p, r]| (p - r).abs()).sum::<f64>() / count;
+        let [diameter, depth, length, width, pitch] = &mut self.dimensions;
+        Metrics {
+            accuracy: f64::from(right) / count,
+            sure: self.sure / count,
+            accuracy_when_sure: self.sure_right / self.sure.max(1.0),
+            calibration_error: calibration,
+            point_accuracy: self.points_right / self.points.max(1.0),
+            segment_iou: self.ious.iter().sum::<f64>() / self.ious.len().max(1) as f64,
+            confusion: self.confusion,
+            position_error_m: quantile(&mut self.position, 0.5),
+            position_error_p90_m: quantile(&mut self.position, 0.9),
+            axis_error_rad: quantile(&mut self.axis, 0.5),
+            axis_error_p90_rad: quantile(&mut self.axis, 0.9),
+            diameter_error: quantile(diameter, 0.5),
+            depth_error: quantile(depth, 0.5),
+            length_error: quantile(length, 0.5),
+            width_error: quantile(width, 0.5),
+            pitch_error: quantile(pitch, 0.5),
+            pitch_measured: self.pitches / self.threads.max(1.0),
+        }
+    }
 }

@@ -1,0 +1,258 @@
+//! Holes, axes and cones: a surface of revolution about the feature's axis.
+
+use nalgebra::{SMatrix, SVector, Vector2, Vector3};
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use tandem_msg::{FeatureClass, FeatureDimensions, Measured};
+
+use super::plane::Plane;
+use super::{Dense, Fit, Frame, Local, measured, quantile, thread, wide};
+use crate::perception::sample::Sample;
+
+const CIRCLES: usize = 160;
+const AXES: usize = 80;
+/// Points that vote on a circle.
+const VOTERS: usize = 240;
+/// Tolerance of a circle's votes, in its radius.
+const TOLERANCE: f64 = 0.05;
+/// Spread allowed between axis and surface normal where there is a surface, and where not.
+const LEAN: [f64; 2] = [0.012, 0.3];
+
+/// A wall of revolution in a local frame: at height z the centre is centre + lean·z and
+/// the radius is radius + slope·z.
+#[derive(Clone, Copy, Debug)]
+struct Wall {
+    centre: Vector2<f64>,
+    lean: Vector2<f64>,
+    radius: f64,
+    slope: f64,
+    /// Standard deviations of centre, radius.
+    sigma: [f64; 2],
+    rms: f64,
+    inliers: usize,
+}
+
+impl Wall {
+    /// Distance of a point from the axis, and from the wall outwards.
+    fn distance(&self, p: &Local) -> (Vector2<f64>, f64) {
+        let off = p.xy() - self.centre - self.lean * p.z;
+        (off, off.norm() - self.radius - self.slope * p.z)
+    }
+}
+
+/// Fits a hole, axis or cone.
+pub(crate) fn fit(
+    surface: Option<&Plane>,
+    sample: &Sample,
+    segment: &[bool],
+    dense: &Dense,
+    class: FeatureClass,
+    rng: &mut ChaCha8Rng,
+) -> Option<Fit> {
+    let middle = dense.feature.iter().sum::<Vector3<f64>>() / dense.feature.len() as f64;
+    let by_surface = surface.and_then(|plane| {
+        let origin = middle - plane.normal * plane.height(middle);
+        let frame = Frame::on(origin, plane.normal);
+        Some((frame, wall(&frame, dense, class, LEAN[0], rng)?))
+    });
+    // What stands out may stand on no surface that is seen: a plug at the end of a cable.
+    let raised = !matches!(class, FeatureClass::ThreadedHole | FeatureClass::SmoothHole);
+    let by_normals = raised
+        .then(|| axis_of_normals(sample, segment, rng))
+        .flatten()
+        .and_then(|axis| {
+            let frame = Frame::on(middle, axis);
+            Some((frame, wall(&frame, dense, class, LEAN[1], rng)?))
+        });
+    let (frame, wall, on_surface) = match (by_surface, by_normals) {
+        (Some((f, w)), Some((_, free))) if 10 * w.inliers >= 8 * free.inliers => (f, w, true),
+        (_, Some((f, w))) => (f, w, false),
+        (Some((f, w)), None) => (f, w, true),
+        (None, None) => return None,
+    };
+    Some(finish(&frame, &wall, on_surface, dense, class, sample))
+}
+
+/// The axis that most normals of the feature keep a common angle to.
+fn axis_of_normals(sample: &Sample, segment: &[bool], rng: &mut ChaCha8Rng) -> Option<Vector3<f64>> {
+    let feature = segment.iter().enumerate().filter(|(_, s)| **s);
+    let normals: Vec<Vector3<f64>> = feature.map(|(i, _)| wide(sample.normal_in_camera(i))).collect();
+    if normals.len() < 12 {
+        return None;
+    }
+    let mut best: (usize, Vector3<f64>) = (0, Vector3::zeros());
+    for _ in 0..AXES {
+        let [a, b, c] = [0; 3].map(|_| normals[rng.random_range(0..normals.len())]);
+        let axis = (a - b).cross(&(a - c));
+        let length = axis.norm();
+        if length < 0.05 {
+            continue;
+        }
+        let axis = axis / length;
+        let level = axis.dot(&a);
+        // Flanks only: caps look along the axis.
+        if level.abs() > 0.75 {
+            continue;
+        }
+        let votes = normals.iter().filter(|n| (axis.dot(n) - level).abs() < 0.08).count();
+        if votes > best.0 {
+            best = (votes, axis);
+        }
+    }
+    let axis = best.1;
+    // Out of the part: towards the camera.
+    (best.0 * 3 >= normals.len()).then_some(if axis.z > 0.0 { -axis } else { axis })
+}
+
+/// The wall among the feature's points, given a frame with z near its axis.
+fn wall(frame: &Frame, dense: &Dense, class: FeatureClass, lean: f64, rng: &mut ChaCha8Rng) -> Option<Wall> {
+    let local: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
+    let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
+    let (low, high) = (quantile(&mut heights, 0.03), quantile(&mut heights, 0.97));
+    let span = high - low;
+    // Floor, cap and chamfer are not wall.
+    let flank: Vec<Local> =
+        local.into_iter().filter(|p| p.z > low + 0.10 * span && p.z < high - 0.08 * span).collect();
+    if flank.len() < 10 {
+        return None;
+    }
+    let cone = class == FeatureClass::Cone;
+    let (centre, radius) = circle(&flank, cone, rng)?;
+    let start = Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2], rms: 0.0, inliers: 0 };
+    refine(start, &flank, lean, cone)
+}
+
+/// The circle most flank points lie on, seen along the axis.
+fn circle(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<(Vector2<f64>, f64)> {
+    let stride = flank.len().div_ceil(VOTERS);
+    let voters: Vec<&Local> = flank.iter().step_by(stride).collect();
+    let extent = flank.iter().fold([f64::MAX, f64::MIN, f64::MAX, f64::MIN], |e, p| {
+        [e[0].min(p.x), e[1].max(p.x), e[2].min(p.y), e[3].max(p.y)]
+    });
+    let widest = (extent[1] - extent[0]).max(extent[3] - extent[2]);
+    let mut best: Option<(usize, Vector2<f64>, f64)> = None;
+    for _ in 0..CIRCLES {
+        let [a, b, c] = [0; 3].map(|_| voters[rng.random_range(0..voters.len())].xy());
+        let Some((centre, radius)) = through(a, b, c) else { continue };
+        if radius > 1.2 * widest || radius < 0.1 * widest {
+            continue;
+        }
+        let tolerance = radius * if cone { 4.0 * TOLERANCE } else { TOLERANCE };
+        let votes = voters.iter().filter(|p| ((p.xy() - centre).norm() - radius).abs() < tolerance).count();
+        if best.is_none_or(|b| votes > b.0) {
+            best = Some((votes, centre, radius));
+        }
+    }
+    best.map(|(_, centre, radius)| (centre, radius))
+}
+
+/// Centre and radius of the circle through three points.
+fn through(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>) -> Option<(Vector2<f64>, f64)> {
+    let (u, v) = (b - a, c - a);
+    let twice = 2.0 * (u.x * v.y - u.y * v.x);
+    if twice.abs() < 1e-12 {
+        return None;
+    }
+    let (uu, vv) = (u.norm_squared(), v.norm_squared());
+    let off = Vector2::new(v.y * uu - u.y * vv, u.x * vv - v.x * uu) / twice;
+    Some((a + off, off.norm()))
+}
+
+/// Gauss–Newton on centre, lean, radius and slope, with Tukey weights. `lean` is the prior
+/// standard deviation of the lean, radians; cylinders keep their slope at nothing.
+fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall> {
+    let start = wall.radius;
+    let mut reach = start * if cone { 0.4 } else { 0.2 };
+    for _ in 0..12 {
+        let mut normal = SMatrix::<f64, 6, 6>::zeros();
+        let mut right = SVector::<f64, 6>::zeros();
+        let (mut squares, mut weight_sum, mut inliers) = (0.0, 0.0, 0);
+        let mut off_wall = Vec::with_capacity(flank.len());
+        for p in flank {
+            let (off, e) = wall.distance(p);
+            off_wall.push(e.abs());
+            if e.abs() > reach {
+                continue;
+            }
+            let w = (1.0 - (e / reach).powi(2)).powi(2);
+            let u = off / off.norm().max(1e-9);
+            let row = SVector::<f64, 6>::from([-u.x, -u.y, -u.x * p.z, -u.y * p.z, -1.0, -p.z]);
+            normal += row * row.transpose() * w;
+            right -= row * (w * e);
+            squares += w * e * e;
+            weight_sum += w;
+            inliers += 1;
+        }
+        if inliers < 8 {
+            return None;
+        }
+        let rms = (squares / weight_sum).sqrt().max(10e-6);
+        // Priors, in units of the measured noise.
+        for (k, prior, now) in [(2, lean, wall.lean.x), (3, lean, wall.lean.y), (5, if cone { 1.0 } else { 1e-6 }, wall.slope)] {
+            let stiffness = (rms / prior).powi(2);
+            normal[(k, k)] += stiffness;
+            right[k] -= stiffness * now;
+        }
+        let inverse = normal.try_inverse()?;
+        let step = inverse * right;
+        wall.centre += Vector2::new(step[0], step[1]);
+        wall.lean += Vector2::new(step[2], step[3]);
+        wall.radius += step[4];
+        wall.slope += step[5];
+        wall.rms = rms;
+        wall.inliers = inliers;
+        wall.sigma = [inverse[(0, 0)].max(inverse[(1, 1)]), inverse[(4, 4)]].map(|v| rms * v.max(0.0).sqrt());
+        reach = (6.0 * quantile(&mut off_wall, 0.5)).clamp(start * 0.02, reach);
+    }
+    let sane = wall.radius > 0.0 && wall.radius < 4.0 * start && wall.lean.norm() < 1.0 && wall.slope.abs() < 2.0;
+    sane.then_some(wall)
+}
+
+fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: FeatureClass, sample: &Sample) -> Fit {
+    let axis = Vector3::new(wall.lean.x, wall.lean.y, 1.0).normalize();
+    // Along the axis from the frame's plane; inside the rim, so that chamfers do not count.
+    let local: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
+    let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
+    let sunk = quantile(&mut heights, 0.5) < 0.0 && on_surface;
+    let base = if on_surface { 0.0 } else { quantile(&mut heights, 0.02) };
+    let end = if sunk { quantile(&mut heights, 0.04) } else { quantile(&mut heights, 0.96) };
+    let end = level(&heights, end, 0.04 * (end - base).abs());
+    let spacing = 2.0 * f64::from(sample.scale) / 100.0;
+    let depth = measured((end - base).abs(), 0.3 * spacing + 0.01 * (end - base).abs());
+
+    let (diameter, pitch) = match class {
+        FeatureClass::ThreadedHole | FeatureClass::ThreadedAxis => {
+            let wound: Vec<[f64; 3]> = local
+                .iter()
+                .filter_map(|p| {
+                    let (off, e) = wall.distance(p);
+                    (e.abs() < 0.2 * wall.radius).then(|| [p.z, off.y.atan2(off.x), e])
+                })
+                .collect();
+            let pitch = thread::pitch(&wound, wall.radius);
+            // The wall is the mean of the profile; the major diameter lies half its height outside.
+            let height = match (class, pitch.value > 0.0) {
+                (FeatureClass::ThreadedHole, true) => 0.5413 * pitch.value,
+                (_, true) => 0.6134 * pitch.value,
+                (_, false) => 0.08 * wall.radius,
+            };
+            (measured(2.0 * wall.radius + height, 2.0 * wall.sigma[1] + 0.3 * height), pitch)
+        }
+        FeatureClass::Cone => {
+            let at_base = wall.radius + wall.slope * base;
+            (measured(2.0 * at_base, 2.0 * wall.sigma[1] + 0.02 * at_base), Measured::default())
+        }
+        _ => (measured(2.0 * wall.radius, 2.0 * wall.sigma[1] + 0.002 * wall.radius), Measured::default()),
+    };
+    let at = Vector3::new(wall.centre.x + wall.lean.x * base, wall.centre.y + wall.lean.y * base, base);
+    Fit {
+        camera_from_feature: frame.pose(at, axis, Vector3::x()),
+        dimensions: FeatureDimensions { diameter, depth, pitch, ..FeatureDimensions::default() },
+    }
+}
+
+/// The middle of the heights within `band` of `near`: the level of a floor or cap.
+fn level(heights: &[f64], near: f64, band: f64) -> f64 {
+    let mut on: Vec<f64> = heights.iter().copied().filter(|h| (h - near).abs() <= band).collect();
+    if on.is_empty() { near } else { quantile(&mut on, 0.5) }
+}

@@ -1,0 +1,112 @@
+//! Slots: the outline of the opening, seen along the surface's normal.
+
+use nalgebra::{Matrix2, SymmetricEigen, Vector2, Vector3};
+use tandem_msg::FeatureDimensions;
+
+use super::plane::Plane;
+use super::{Dense, Fit, Frame, Local, measured, quantile};
+
+/// Fits a slot: direction, centre, length, width, depth.
+///
+/// The camera looks aslant, so the wall on its side is hidden and the floor is cut off
+/// there; the surface is seen up to both edges. Edges are therefore taken from where the
+/// surface ends, and only the depth from the floor.
+pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
+    let middle = dense.feature.iter().sum::<Vector3<f64>>() / dense.feature.len() as f64;
+    let frame = Frame::on(middle - plane.normal * plane.height(middle), plane.normal);
+    let inside: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
+    let band = (4.0 * plane.rms).max(40e-6);
+    let on: Vec<Local> = dense.rest.iter().map(|p| frame.local(*p)).filter(|p| p.z.abs() < band).collect();
+
+    let mut along = longest(&inside);
+    let mut centre = Vector2::zeros();
+    let (mut length, mut width) = (0.0, 0.0);
+    let (mut length_seen, mut spacing) = (true, 0.0);
+    for round in 0..3 {
+        let across = Vector2::new(-along.y, along.x);
+        let place = |p: &Local| Vector2::new(along.dot(&(p.xy() - centre)), across.dot(&(p.xy() - centre)));
+        let feature: Vec<Vector2<f64>> = inside.iter().map(place).collect();
+        let mut xs: Vec<f64> = feature.iter().map(|p| p.x).collect();
+        let mut ys: Vec<f64> = feature.iter().map(|p| p.y).collect();
+        let (x0, x1) = (quantile(&mut xs, 0.01), quantile(&mut xs, 0.99));
+        let (y0, y1) = (quantile(&mut ys, 0.01), quantile(&mut ys, 0.99));
+        let plate: Vec<Vector2<f64>> = on.iter().map(place).collect();
+        spacing = ((x1 - x0) * (y1 - y0) / feature.len().max(1) as f64).sqrt();
+
+        // Both long edges, over the straight part.
+        let mid = Vector2::new(0.5 * (x0 + x1), 0.5 * (y0 + y1));
+        let straight = (0.5 * (x1 - x0) - 0.7 * (y1 - y0)).max(0.2 * (x1 - x0));
+        let beside: Vec<Vector2<f64>> = plate.iter().copied().filter(|p| (p.x - mid.x).abs() < straight).collect();
+        let edge_y = gap(beside.iter().map(|p| p.y), mid.y, y1 - y0).unwrap_or([y0, y1]);
+        if round < 2 {
+            // Turn along the edges: slope of the gap's middle from one half to the other.
+            let half = |sign: f64| {
+                let part = beside.iter().filter(|p| sign * (p.x - mid.x) > 0.0).map(|p| p.y);
+                gap(part, mid.y, y1 - y0).map(|e| 0.5 * (e[0] + e[1]))
+            };
+            if let (Some(left), Some(right)) = (half(-1.0), half(1.0)) {
+                let turn = ((right - left) / straight).clamp(-0.1, 0.1);
+                along = (along + across * turn).normalize();
+            }
+        }
+        // Both ends, near the middle line.
+        let y_mid = 0.5 * (edge_y[0] + edge_y[1]);
+        let strip = 0.2 * (edge_y[1] - edge_y[0]).max(2.0 * spacing);
+        let ends = gap(plate.iter().filter(|p| (p.y - y_mid).abs() < strip).map(|p| p.x), mid.x, x1 - x0);
+        length_seen = ends.is_some();
+        let edge_x = ends.unwrap_or([x0, x1]);
+        length = edge_x[1] - edge_x[0];
+        width = edge_y[1] - edge_y[0];
+        centre += along * (0.5 * (edge_x[0] + edge_x[1])) + Vector2::new(-along.y, along.x) * y_mid;
+    }
+    let mut heights: Vec<f64> = inside.iter().map(|p| -p.z).collect();
+    let deep = quantile(&mut heights, 0.85);
+    let mut floor: Vec<f64> = heights.iter().copied().filter(|h| *h > 0.8 * deep).collect();
+    let depth = quantile(&mut floor, 0.5);
+    let dimensions = FeatureDimensions {
+        length: if length_seen { measured(length, 0.5 * spacing) } else { measured(length, 0.3 * length) },
+        width: measured(width, 0.3 * spacing),
+        depth: measured(depth, plane.rms + 0.02 * depth),
+        ..FeatureDimensions::default()
+    };
+    let pose = frame.pose(
+        Vector3::new(centre.x, centre.y, 0.0),
+        Vector3::z(),
+        Vector3::new(along.x, along.y, 0.0),
+    );
+    Some(Fit { camera_from_feature: pose, dimensions })
+}
+
+/// Direction of greatest spread, x positive.
+pub(crate) fn longest(points: &[Local]) -> Vector2<f64> {
+    let share = 1.0 / points.len().max(1) as f64;
+    let mean = points.iter().map(|p| p.xy()).sum::<Vector2<f64>>() * share;
+    let covariance = points.iter().fold(Matrix2::zeros(), |sum, p| {
+        let d = p.xy() - mean;
+        sum + d * d.transpose() * share
+    });
+    let eigen = SymmetricEigen::new(covariance);
+    let along: Vector2<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
+    if along.x < 0.0 { -along } else { along }
+}
+
+/// The empty interval around `middle`: the last coordinate below and the first above it that
+/// are not stray. `None` when one side shows nothing within three times `extent`.
+fn gap(values: impl Iterator<Item = f64>, middle: f64, extent: f64) -> Option<[f64; 2]> {
+    let (mut below, mut above) = (Vec::new(), Vec::new());
+    for v in values {
+        if v < middle - 0.25 * extent {
+            below.push(v);
+        } else if v > middle + 0.25 * extent {
+            above.push(v);
+        }
+    }
+    if below.len() < 4 || above.len() < 4 {
+        return None;
+    }
+    below.sort_unstable_by(|a, b| b.total_cmp(a));
+    above.sort_unstable_by(f64::total_cmp);
+    // The very first may be a stray point.
+    let edges = [below[1], above[1]];
+    (middle - edges[0] < 3.0 * extent && edges[1] - middle < 3.0 * extent).then_some(edges)
+}
