@@ -110,19 +110,15 @@ fn stream(seed: u64, organ: u64) -> ChaCha8Rng {
 /// Why a plant cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlantError {
-    /// The arm at rest stands in its own way or outside its limits.
-    #[error("{robot}: joint {joint} rests at {position} rad, allowed {min}..={max} rad; correct the resting position")]
-    HomeOutsideLimits {
+    /// Joints and masses do not match.
+    #[error("arm {robot}: {joints} joints need masses of {} links, found {links}; correct the robot's file", joints + 1)]
+    LinkCount {
         /// Name of the arm.
         robot: String,
-        /// Joint, counted from 0.
-        joint: usize,
-        /// Where it rests, rad.
-        position: f64,
-        /// Lower limit, rad.
-        min: f64,
-        /// Upper limit, rad.
-        max: f64,
+        /// Moving joints.
+        joints: usize,
+        /// Links with a mass, the base included.
+        links: usize,
     },
 }
 
@@ -130,10 +126,9 @@ impl Plant {
     /// The hardware of a cell, standing still: arm at rest, tools in the rack, parts in the feeder.
     ///
     /// # Errors
-    /// An arm that cannot rest where its configuration says.
+    /// An arm whose joints and masses do not match.
     pub fn new(cell: &Cell, seed: u64) -> Result<Self, PlantError> {
-        let robot = model::robot(cell)?;
-        Ok(Self::of(PlantModel::of(cell, &robot), Eye::new(cell, stream(seed, 5)), seed))
+        Ok(Self::of(PlantModel::of(cell)?, Eye::new(cell, stream(seed, 5)), seed))
     }
 
     fn of(model: PlantModel, eye: Eye, seed: u64) -> Self {

@@ -96,8 +96,8 @@ impl Rig {
 
     /// Moves the tool centre point to a pose, in joint space, and stands there.
     fn tcp_to(&mut self, pose: &Isometry3<f64>) {
-        let robot = model::robot(&self.cell).expect("the shipped arm");
-        let goal = robot.chain.inverse(pose, &self.command.position).unwrap_or_else(|e| panic!("{e:?}: {pose}"));
+        let goal =
+            self.cell.robot.chain.inverse(pose, &self.command.position).unwrap_or_else(|e| panic!("{e:?}: {pose}"));
         let farthest =
             (0..JOINTS_MAX).map(|joint| (goal[joint] - self.command.position[joint]).abs()).fold(0.0, f64::max);
         self.move_to(&goal, (1.875 * farthest / 1.6).max(0.5));
