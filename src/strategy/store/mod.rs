@@ -10,12 +10,14 @@
 //! **Invariant:** no password appears in a message.
 
 mod error;
+mod history;
 mod journal;
 mod library;
 mod schema;
 mod url;
 
 pub use error::StoreError;
+pub use history::PastRun;
 pub use journal::RunRecord;
 pub use url::{default_url, shown};
 
