@@ -285,9 +285,9 @@ impl std::fmt::Display for Outcome {
         match self {
             Self::Completed => f.write_str("completed"),
             Self::Failed { reason } => write!(f, "failed: {reason}"),
-            Self::Interrupted => f.write_str("interrupted"),
-            Self::Fault { role, fault } => write!(f, "stopped by a fault: {role} {fault}"),
-            Self::TimedOut { waiting_for } => write!(f, "timed out waiting for {waiting_for}"),
+            Self::Interrupted => f.write_str("interrupted: the arm was stopped first"),
+            Self::Fault { role, fault } => write!(f, "stopped by a fault of {role}: {fault}"),
+            Self::TimedOut { waiting_for } => write!(f, "gave up waiting for {waiting_for}"),
         }
     }
 }

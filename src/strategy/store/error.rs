@@ -12,7 +12,12 @@ pub enum StoreError {
         /// The URL, password hidden.
         url: String,
     },
-    /// The lock file beside the database cannot be made or locked.
+    /// There is no folder for the default database.
+    #[error(
+        "no folder for the store: neither XDG_STATE_HOME nor HOME is set; set one of them, or `[store] url` in the cell file"
+    )]
+    NoStateFolder,
+    /// The folder of the database cannot be made or locked.
     #[error("{path}: {why}; make the folder writable, or set `[store] url` in the cell file")]
     Folder {
         /// The folder or lock file.

@@ -24,35 +24,6 @@ pub struct RunRecord {
     pub started_ns: i64,
 }
 
-/// A run with how it ended, or `running` while it has not.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PastRun {
-    /// As it was recorded when it began.
-    pub record: RunRecord,
-    /// How it ended.
-    pub outcome: String,
-}
-
-pub(super) async fn runs(pool: &AnyPool) -> Result<Vec<PastRun>, StoreError> {
-    let mut runs = Vec::new();
-    for row in sqlx::query("SELECT * FROM run ORDER BY started_ns, id").fetch_all(pool).await? {
-        let hash: String = row.try_get("config_hash")?;
-        runs.push(PastRun {
-            record: RunRecord {
-                id: row.try_get("id")?,
-                cell: row.try_get("cell")?,
-                product: row.try_get("product")?,
-                config_hash: u64::from_str_radix(&hash, 16).unwrap_or_default(),
-                seed: row.try_get::<i64, _>("seed")?.cast_unsigned(),
-                boxes: u32::try_from(row.try_get::<i64, _>("boxes")?).unwrap_or(u32::MAX),
-                started_ns: row.try_get("started_ns")?,
-            },
-            outcome: row.try_get("outcome")?,
-        });
-    }
-    Ok(runs)
-}
-
 pub(super) async fn begin(pool: &AnyPool, run: &RunRecord) -> Result<(), StoreError> {
     let mut transaction = pool.begin().await?;
     let id = run.id.to_lowercase();

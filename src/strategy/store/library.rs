@@ -11,11 +11,8 @@ const FILE: &str = "file";
 /// Rows the user brought in by hand; they stay.
 const IMPORTED: &str = "imported";
 
-/// Makes the rows of origin `file` equal to `seeds`; without seeds they stay as they are.
+/// Makes the rows of origin `file` equal to `seeds`.
 pub(super) async fn sync(pool: &AnyPool, seeds: &[StrategyRow]) -> Result<(), StoreError> {
-    if seeds.is_empty() {
-        return Ok(());
-    }
     seeds.iter().try_for_each(check)?;
     let mut stored = read_where(pool, "SELECT * FROM strategy WHERE origin = 'file' ORDER BY id").await?;
     let mut wanted = seeds.to_vec();

@@ -1,8 +1,7 @@
 //! Where a database is.
 
 use super::error::StoreError;
-use std::os::unix::fs::DirBuilderExt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A database as sqlx shall open it.
 pub(super) struct Target {
@@ -52,15 +51,26 @@ pub fn shown(url: &str) -> String {
 }
 
 /// The database of a cell that names none: a SQLite file in the user's state folder,
-/// `$XDG_STATE_HOME/tandem/<cell>.db` or `~/.local/state/tandem/<cell>.db`, or in the
-/// working folder for a user without a home. Makes the folder, readable by its owner
-/// only; where that fails, opening the database says so.
-pub fn default_url(cell: &str) -> String {
+/// `$XDG_STATE_HOME/tandem/<cell>.db` or `~/.local/state/tandem/<cell>.db`. Makes the
+/// folder, readable by its owner only.
+///
+/// # Errors
+/// Neither variable is set, or the folder cannot be made.
+pub fn default_url(cell: &str) -> Result<String, StoreError> {
     let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
     let state = absolute("XDG_STATE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".local/state")));
-    let Some(folder) = state.map(|state| state.join("tandem")) else { return format!("sqlite://{cell}.db") };
-    let _ = std::fs::DirBuilder::new().recursive(true).mode(0o700).create(&folder);
-    format!("sqlite://{}", folder.join(format!("{cell}.db")).display())
+    let folder = state.ok_or(StoreError::NoStateFolder)?.join("tandem");
+    make_folder(&folder)?;
+    Ok(format!("sqlite://{}", folder.join(format!("{cell}.db")).display()))
+}
+
+fn make_folder(folder: &Path) -> Result<(), StoreError> {
+    use std::os::unix::fs::DirBuilderExt;
+    std::fs::DirBuilder::new()
+        .recursive(true)
+        .mode(0o700)
+        .create(folder)
+        .map_err(|error| StoreError::Folder { path: folder.display().to_string(), why: error.to_string() })
 }
 
 #[cfg(test)]
