@@ -6,9 +6,8 @@ use nalgebra::Isometry3;
 use std::time::Duration;
 use tandem_config::{Cell, pose_of};
 use tandem_msg::{
-    Answer, Code, Coded, EffectorAction, EffectorState, FeatureClass, Header, Measured, MotionFailure, MotionPhase,
-    Planner, Pose, PromptKind, Recognition, RequestKind, RequestPhase, Role, RunMode, Stamp, StopCause, StopState,
-    Subtask, Tool,
+    Answer, Code, Coded, EffectorAction, FeatureClass, Header, Measured, MotionFailure, MotionPhase, Planner,
+    PromptKind, Recognition, RequestKind, RequestPhase, Role, RunMode, Stamp, StopCause, StopState, Subtask, Tool,
 };
 
 const PERIOD: Duration = Duration::from_millis(10);
@@ -290,7 +289,8 @@ impl Fake {
             return;
         }
         let age = self.prompt_since.age_at(self.now);
-        if age < Duration::from_secs(1) || self.operator.answer.is(Answer::Declined) {
+        let over = self.operator.answer.is(Answer::Declined) || self.operator.answer.is(Answer::Done);
+        if age < Duration::from_secs(1) || over {
             return;
         }
         if let Some((declined, times)) = &mut self.script.declines {
@@ -676,6 +676,4 @@ fn tasks_are_whole() {
     let last = run.fake.tasks.last().map(|(_, objects)| objects.len());
     assert_eq!(last, Some(5 + 9), "bench, fixture, two carriers, rack, and nine parts in the box");
     assert!(run.fake.prompts.iter().all(|(_, part)| *part < 10));
-    let _ = EffectorState::default();
-    let _ = Pose::IDENTITY;
 }
