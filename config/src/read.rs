@@ -218,7 +218,7 @@ impl<'d> Table<'d> {
     }
 
     fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'_>>, wanted: &str) {
-        let found = format!("a {}", value.get_ref().type_str());
+        let found = kind_of(value);
         self.reading.note(self.fault_in(value.span(), self.field(key), found, wanted, "write it as that"));
     }
 
@@ -229,8 +229,8 @@ impl<'d> Table<'d> {
                 let digits = integer.as_str().replace('_', "");
                 (i64::from_str_radix(&digits, integer.radix()).ok().map(|n| n as f64), integer.to_string())
             }
-            other => {
-                let found = format!("a {}", other.type_str());
+            _ => {
+                let found = kind_of(value);
                 let fault = self.fault_in(value.span(), field, found, &bound.allowed(), "write a number");
                 self.reading.note(fault);
                 return bound.min;
@@ -464,6 +464,13 @@ impl Drop for Table<'_> {
             }
         }
     }
+}
+
+/// What stands there instead, with its article.
+fn kind_of(value: &Spanned<DeValue<'_>>) -> String {
+    let kind = value.get_ref().type_str();
+    let article = if kind.starts_with(['a', 'i']) { "an" } else { "a" };
+    format!("{article} {kind}")
 }
 
 /// The known key that differs from `name` only in its unit, or by at most two letters.
