@@ -7,6 +7,7 @@ use crate::perception::Perception;
 use crate::plant::Plant;
 use crate::product::{self, Product};
 use crate::read::{Reading, Table};
+use crate::robot::Robot;
 use crate::strategy::{self, ReferenceRow, StrategyRow};
 use crate::supervisor::Supervisor;
 use crate::timing::{Realtime, Timing};
@@ -30,8 +31,8 @@ pub struct Cell {
     pub file: PathBuf,
     /// Hash of all files read, blake3 cut to 64 bits: peers of another configuration are refused.
     pub hash: u64,
-    /// URDF of the arm.
-    pub robot_file: PathBuf,
+    /// The arm.
+    pub robot: Robot,
     /// When each role runs.
     pub timing: Timing,
     /// What is asked of the operating system.
@@ -89,7 +90,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     let perception = Perception::read(&root, folder);
     let supervisor = Supervisor::read(&root);
     let store = read_store(&root);
-    let robot_file = root.text("robot").map(|file| beside(folder, &file));
+    let robot = Robot::read(&root, folder, reading);
     let product = layout.as_ref().and_then(|layout| read_product(&root, product, folder, layout, reading));
     let (mut reference, mut strategies) = (Vec::new(), Vec::new());
     for file in root.texts("strategies") {
@@ -114,7 +115,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         name: name?,
         file: path.to_owned(),
         hash: 0,
-        robot_file: robot_file?,
+        robot: robot?,
         timing,
         realtime,
         layout: layout?,
