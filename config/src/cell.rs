@@ -1,5 +1,6 @@
 //! A cell: everything its files say, checked.
 
+use crate::controller;
 use crate::fault::Faults;
 use crate::human::Human;
 use crate::layout::Layout;
@@ -12,6 +13,7 @@ use crate::strategy::{self, ReferenceRow, StrategyRow};
 use crate::supervisor::Supervisor;
 use crate::timing::{Realtime, Timing};
 use std::path::{Component, Path, PathBuf};
+use tandem_controller::Params;
 
 /// Where the strategy library and the journal are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -33,6 +35,8 @@ pub struct Cell {
     pub hash: u64,
     /// The arm.
     pub robot: Robot,
+    /// Limits and margins of the controller, with this cell's hash, period and resting configuration.
+    pub controller: Params,
     /// When each role runs.
     pub timing: Timing,
     /// What is asked of the operating system.
@@ -68,7 +72,12 @@ impl Cell {
         let cell = read(path, product, &reading);
         let (hash, faults) = reading.finish();
         match cell {
-            Some(cell) if faults.is_empty() => Ok(Self { hash, ..cell }),
+            Some(mut cell) if faults.is_empty() => {
+                cell.hash = hash;
+                cell.controller.config_hash = hash;
+                cell.controller.home = cell.robot.home;
+                Ok(cell)
+            }
             _ => Err(Faults::new(faults)),
         }
     }
@@ -83,6 +92,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     // Every part is read before any is missed, so that one pass reports all faults.
     let name = root.text("name");
     let timing = Timing::read(&root);
+    let controller = controller::read(&root, &timing);
     let realtime = Realtime::read(&root);
     let layout = Layout::read(&root);
     let human = Human::read(&root);
@@ -116,6 +126,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         file: path.to_owned(),
         hash: 0,
         robot: robot?,
+        controller,
         timing,
         realtime,
         layout: layout?,

@@ -14,6 +14,7 @@
 mod body;
 mod camera;
 mod cell;
+mod controller;
 mod fault;
 mod human;
 mod layout;

@@ -116,13 +116,6 @@ impl Reading {
         self.faults.borrow_mut().extend(faults);
     }
 
-    /// Folds bytes that belong to the cell but were read elsewhere into the hash.
-    pub(crate) fn fold(&self, bytes: &[u8]) {
-        let mut hasher = self.hasher.borrow_mut();
-        hasher.update(&(bytes.len() as u64).to_le_bytes());
-        hasher.update(bytes);
-    }
-
     /// The hash over all files read, and all faults found.
     pub(crate) fn finish(self) -> (u64, Vec<Fault>) {
         let hash = *self.hasher.into_inner().finalize().as_bytes();
@@ -445,9 +438,9 @@ impl<'d> Table<'d> {
         Isometry3::from_parts(Translation3::from(position), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
     }
 
-    /// Keys in the order of the file's table, for tables whose keys are names.
-    pub(crate) fn keys(&self) -> Vec<String> {
-        self.entries.keys().map(|key| key.get_ref().to_string()).collect()
+    /// The key of this table that begins with `stem`.
+    pub(crate) fn key_beginning_with(&self, stem: &str) -> Option<String> {
+        self.entries.keys().map(|key| key.get_ref().to_string()).find(|key| key.starts_with(stem))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::Check;
@@ -46,6 +46,13 @@ pub(super) fn leftovers() -> Check {
         format!("if no other user or container runs these cells: rm {}", files.join(" "))
     };
     Check::degraded(NAME, names.join(", "), matters, fix)
+}
+
+/// Where the journal lies unless the cell file says otherwise; see [`crate::strategy::store::default_url`].
+pub(super) fn state_folder() -> PathBuf {
+    let home = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".local/state"));
+    let state = std::env::var_os("XDG_STATE_HOME").map(PathBuf::from).or_else(home);
+    state.map_or_else(std::env::temp_dir, |state| state.join("tandem"))
 }
 
 pub(super) fn flush(folder: &Path) -> Check {
