@@ -274,38 +274,40 @@ impl<'d> Table<'d> {
 
     /// `N` numbers, each within the same bounds.
     pub(crate) fn numbers<const N: usize>(&self, bound: &Bound) -> [f64; N] {
-        let mut out = [bound.min; N];
-        out.copy_from_slice(&self.list(bound, N));
-        out
-    }
-
-    /// As many numbers as `count`, each within the same bounds.
-    pub(crate) fn list(&self, bound: &Bound, count: usize) -> Vec<f64> {
-        let allowed = format!("{count} numbers, each {}", bound.allowed());
+        let allowed = format!("{N} numbers, each {}", bound.allowed());
         let Some(value) = self.take(bound.key) else {
             self.missing(bound.key, &allowed);
-            return vec![bound.min; count];
+            return [bound.min; N];
         };
         match value.get_ref().as_array() {
-            Some(array) if array.len() == count => {
-                let field = |index| format!("{}[{index}]", self.field(bound.key));
-                array.iter().enumerate().map(|(index, item)| self.check(bound, field(index), item)).collect()
+            Some(array) if array.len() == N => {
+                let mut out = [bound.min; N];
+                for (index, item) in array.iter().enumerate() {
+                    out[index] = self.check(bound, format!("{}[{index}]", self.field(bound.key)), item);
+                }
+                out
             }
             Some(array) => {
                 let found = format!("{} numbers", array.len());
                 self.refuse(bound.key, &found, &allowed, "write as many numbers as that");
-                vec![bound.min; count]
+                [bound.min; N]
             }
             None => {
                 self.wrong_type(bound.key, value, &allowed);
-                vec![bound.min; count]
+                [bound.min; N]
             }
         }
     }
 
-    /// As [`Table::list`], or `None` when the key does not stand there.
-    pub(crate) fn list_if(&self, bound: &Bound, count: usize) -> Option<Vec<f64>> {
-        self.has(bound.key).then(|| self.list(bound, count))
+    /// As many numbers as stand there, each within the same bounds.
+    pub(crate) fn list(&self, bound: &Bound) -> Vec<f64> {
+        let Some(value) = self.take(bound.key) else { return Vec::new() };
+        let Some(array) = value.get_ref().as_array() else {
+            self.wrong_type(bound.key, value, &format!("numbers, each {}", bound.allowed()));
+            return Vec::new();
+        };
+        let item = |(index, item)| self.check(bound, format!("{}[{index}]", self.field(bound.key)), item);
+        array.iter().enumerate().map(item).collect()
     }
 
     /// A text that is not empty.

@@ -14,9 +14,7 @@ mod shape;
 mod source;
 mod tree;
 
-use crate::cell::beside;
 use crate::fault::{Fault, Faults};
-use crate::read::{Bound, Reading, Table, bound};
 use nalgebra::{Isometry3, Unit, Vector3};
 use source::Source;
 use std::path::{Path, PathBuf};
@@ -32,10 +30,6 @@ const CONTINUOUS: f64 = 200.0 * std::f64::consts::PI;
 const ACCELERATION_PER_VELOCITY: f64 = 2.0;
 /// Jerk of a joint whose file gives none: it reaches its acceleration in a tenth of a second.
 const JERK_PER_ACCELERATION: f64 = 10.0;
-
-const HOME: Bound = bound("home_rad", "rad", -100.0, 100.0);
-const ACCELERATION_MAX: Bound = bound("acceleration_max_rad_s2", "rad/s2", 0.01, 100.0);
-const JERK_MAX: Bound = bound("jerk_max_rad_s3", "rad/s3", 0.1, 10_000.0);
 
 /// What a cell says of its arm beyond the URDF; lists have one entry a moving joint, in rad or m.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -73,36 +67,6 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Reads the `[robot]` table of a cell and the URDF it names.
-    pub(crate) fn read(cell: &Table<'_>, folder: &Path, reading: &Reading) -> Option<Self> {
-        let table = cell.table("robot")?;
-        let tcp = table.text_if("tcp");
-        let optional = [&HOME, &ACCELERATION_MAX, &JERK_MAX];
-        let written = optional.map(|bound| table.has(bound.key));
-        let file = beside(folder, &table.text("urdf")?);
-        let asked = table.fault_at("urdf", &format!("\"{}\"", file.display()), "a URDF file", "");
-        let document = reading.open(&file, Some(asked))?;
-        let mut options = RobotOptions { tcp, ..RobotOptions::default() };
-        let noted = |faults| reading.note_all(faults);
-        let robot = Self::parse(&file, &document.text, &options).map_err(noted).ok()?;
-        if written == [false; 3] {
-            return Some(robot);
-        }
-        // How many numbers the lists must have is known only now.
-        let count = robot.chain.joint_count();
-        options.home = table.list_if(&HOME, count);
-        options.acceleration_max = table.list_if(&ACCELERATION_MAX, count);
-        options.jerk_max = table.list_if(&JERK_MAX, count);
-        for ((home, joint), name) in options.home.iter().flatten().zip(robot.chain.joints()).zip(&robot.joint_names) {
-            let (min, max) = (joint.position_min, joint.position_max);
-            if !(min..=max).contains(home) {
-                let found = format!("{home} rad for joint \"{name}\"");
-                table.refuse(HOME.key, &found, &format!("{min}..={max} rad"), "stay within the joint's limits");
-            }
-        }
-        Self::parse(&file, &document.text, &options).map_err(noted).ok()
-    }
-
     /// Reads a URDF file.
     ///
     /// # Errors

@@ -108,7 +108,7 @@ fn the_cell_is_within_reach() {
         assert!(manipulability(&robot.chain.jacobian(near).1) > 0.1, "{name}: {near:?}");
     }
     let home = robot.chain.forward(&robot.home).base_from_tcp;
-    assert!((home.rotation * Vector3::z() + Vector3::z()).norm() < 1e-6, "home points down: {home}");
+    assert!((home.rotation * Vector3::z() + Vector3::z()).norm() < 1e-3, "home points down: {home}");
 }
 
 /// Two sliding joints and one turning, with links fixed in between and beyond.
