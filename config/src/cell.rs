@@ -1,5 +1,6 @@
 //! A cell: everything its files say, checked.
 
+use crate::controller;
 use crate::fault::Faults;
 use crate::human::Human;
 use crate::layout::Layout;
@@ -11,6 +12,7 @@ use crate::strategy::{self, ReferenceRow, StrategyRow};
 use crate::supervisor::Supervisor;
 use crate::timing::{Realtime, Timing};
 use std::path::{Component, Path, PathBuf};
+use tandem_controller::Params;
 
 /// Where the strategy library and the journal are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,6 +34,8 @@ pub struct Cell {
     pub hash: u64,
     /// URDF of the arm.
     pub robot_file: PathBuf,
+    /// Limits and margins of the controller, with this cell's hash, period and resting configuration.
+    pub controller: Params,
     /// When each role runs.
     pub timing: Timing,
     /// What is asked of the operating system.
@@ -67,7 +71,11 @@ impl Cell {
         let cell = read(path, product, &reading);
         let (hash, faults) = reading.finish();
         match cell {
-            Some(cell) if faults.is_empty() => Ok(Self { hash, ..cell }),
+            Some(mut cell) if faults.is_empty() => {
+                cell.hash = hash;
+                cell.controller.config_hash = hash;
+                Ok(cell)
+            }
             _ => Err(Faults::new(faults)),
         }
     }
@@ -82,6 +90,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     // Every part is read before any is missed, so that one pass reports all faults.
     let name = root.text("name");
     let timing = Timing::read(&root);
+    let controller = controller::read(&root, &timing);
     let realtime = Realtime::read(&root);
     let layout = Layout::read(&root);
     let human = Human::read(&root);
@@ -90,18 +99,11 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     let supervisor = Supervisor::read(&root);
     let store = read_store(&root);
     let robot_file = root.text("robot").map(|file| beside(folder, &file));
-    let product = layout
-        .as_ref()
-        .and_then(|layout| read_product(&root, product, folder, layout, reading));
+    let product = layout.as_ref().and_then(|layout| read_product(&root, product, folder, layout, reading));
     let (mut reference, mut strategies) = (Vec::new(), Vec::new());
     for file in root.texts("strategies") {
         let file = beside(folder, &file);
-        let asked = root.fault_at(
-            "strategies",
-            &format!("\"{}\"", file.display()),
-            "a strategy file",
-            "",
-        );
+        let asked = root.fault_at("strategies", &format!("\"{}\"", file.display()), "a strategy file", "");
         let Some(document) = reading.open(&file, Some(asked)) else {
             continue;
         };
@@ -113,17 +115,8 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         strategies.extend(strategy::read_strategies(&table));
     }
     if reference.is_empty() || strategies.is_empty() {
-        let found = format!(
-            "{} reference rows, {} strategies",
-            reference.len(),
-            strategies.len()
-        );
-        root.refuse(
-            "strategies",
-            &found,
-            "at least one of each",
-            "list the files of config/strategies",
-        );
+        let found = format!("{} reference rows, {} strategies", reference.len(), strategies.len());
+        root.refuse("strategies", &found, "at least one of each", "list the files of config/strategies");
     }
 
     Some(Cell {
@@ -131,6 +124,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         file: path.to_owned(),
         hash: 0,
         robot_file: robot_file?,
+        controller,
         timing,
         realtime,
         layout: layout?,
@@ -151,18 +145,10 @@ fn read_store(root: &Table<'_>) -> Store {
     }
     let url = root.table("store").and_then(|table| {
         let url = table.text_if("url")?;
-        if !["sqlite:", "mysql:", "mariadb:"]
-            .iter()
-            .any(|scheme| url.starts_with(scheme))
-        {
+        if !["sqlite:", "mysql:", "mariadb:"].iter().any(|scheme| url.starts_with(scheme)) {
             let scheme = url.split(':').next().unwrap_or_default();
             let advice = "write sqlite://FILE or mysql://USER@HOST/DATABASE";
-            table.refuse(
-                "url",
-                &format!("\"{scheme}:…\""),
-                "sqlite:, mysql: or mariadb:",
-                advice,
-            );
+            table.refuse("url", &format!("\"{scheme}:…\""), "sqlite:, mysql: or mariadb:", advice);
         }
         Some(url)
     });
@@ -176,20 +162,12 @@ fn read_product(
     layout: &Layout,
     reading: &Reading,
 ) -> Option<Product> {
-    let products = root
-        .text("products")
-        .map(|products| beside(folder, &products));
+    let products = root.text("products").map(|products| beside(folder, &products));
     let named = root.text("product");
     let name = chosen.map(str::to_owned).or(named)?;
-    let file = if name.ends_with(".toml") {
-        PathBuf::from(&name)
-    } else {
-        products?.join(format!("{name}.toml"))
-    };
+    let file = if name.ends_with(".toml") { PathBuf::from(&name) } else { products?.join(format!("{name}.toml")) };
     let found = format!("\"{name}\"");
-    let asked = chosen
-        .is_none()
-        .then(|| root.fault_at("product", &found, "a product of the products folder", ""));
+    let asked = chosen.is_none().then(|| root.fault_at("product", &found, "a product of the products folder", ""));
     let document = reading.open(&file, asked)?;
     let parsed = document.parse(reading);
     let table = document.root(reading, &parsed);
@@ -197,10 +175,7 @@ fn read_product(
     let properties = table.text("properties").and_then(|properties| {
         let properties = beside(folder, &properties);
         let found = format!("\"{}\"", properties.display());
-        reading.open(
-            &properties,
-            Some(table.fault_at("properties", &found, "a JSON file", "")),
-        )
+        reading.open(&properties, Some(table.fault_at("properties", &found, "a JSON file", "")))
     });
     Some(product::read(&table, properties.as_ref(), layout, reading))
 }
@@ -210,9 +185,7 @@ pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
     let mut out = PathBuf::new();
     for component in folder.join(written).components() {
         match component {
-            Component::ParentDir
-                if matches!(out.components().next_back(), Some(Component::Normal(_))) =>
-            {
+            Component::ParentDir if matches!(out.components().next_back(), Some(Component::Normal(_))) => {
                 out.pop();
             }
             Component::CurDir => {}

@@ -24,7 +24,8 @@ use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{ColliderBuilder, PhysicsWorld};
 use tandem_config::Cell;
 use tandem_msg::{
-    CellRequest, CellState, HumanState, JointCommand, JointState, OperatorEvent, PointCloud, Prompt, Stamp,
+    CellRequest, CellState, EffectorCommand, HumanState, JointCommand, JointState, OperatorEvent, PlantFault,
+    PointCloud, Prompt, Stamp,
 };
 
 mod arm;
@@ -190,7 +191,10 @@ impl Plant {
         };
         self.person.cycle(now, dt, inputs.prompt, &sight, &mut self.parts, &mut self.world);
         let reach = Reach { base_from_tcp: &self.base_from_tcp, tcp_velocity, hand_on: self.person.hand_on() };
-        self.effector.cycle(now, &inputs.command.effector, &reach, &mut self.parts, &mut self.world);
+        // A tool obeys nobody whom the drives do not obey; what it has begun, it finishes.
+        let heeded = self.drive.fault() == PlantFault::None;
+        let command = if heeded { inputs.command.effector } else { EffectorCommand::default() };
+        self.effector.cycle(now, &command, &reach, &mut self.parts, &mut self.world);
         self.load_arm();
         self.referee.cycle(
             now,

@@ -23,7 +23,7 @@ const PRESENT_SPREAD: f64 = 0.15;
 pub(super) struct FeederModel {
     /// Carriers, by index.
     pub(super) base_from_station: Vec<Isometry3<f64>>,
-    /// Spread of a part in the plane of its carrier: metres, radians (standard deviations, cut at three).
+    /// Spread of a part in the plane of its carrier: metres, radians (standard deviations; the carrier's stops cut at two).
     pub(super) jitter: (f64, f64),
     /// Seconds to bring an empty fixture.
     pub(super) new_box: f64,
@@ -133,7 +133,7 @@ impl Feeder {
         let Some(base_from_station) = self.model.base_from_station.get(model.station).copied() else { return false };
         let (metres, radians) = self.model.jitter;
         let mut drawn = || -> f64 { Normal::new(0.0, 1.0).map_or(0.0, |normal| normal.sample(random)) };
-        let mut spread = |sigma: f64| drawn().clamp(-3.0, 3.0) * sigma;
+        let mut spread = |sigma: f64| drawn().clamp(-2.0, 2.0) * sigma;
         let lies = Isometry3::from_parts(
             Translation3::new(spread(metres), spread(metres), 0.0),
             UnitQuaternion::from_axis_angle(&Vector3::z_axis(), spread(radians)),

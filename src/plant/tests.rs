@@ -313,6 +313,8 @@ fn a_bad_command_never_moves_the_arm() {
         let before = rig.out.arm.position;
         let good = rig.command;
         spoil(&mut rig.command);
+        rig.command.effector.id += 1;
+        rig.command.effector.action = EffectorAction::Release.into();
         rig.command.valid_until = rig.now.after(Duration::from_secs(1));
         rig.command.header.seq += 1;
         for _ in 0..100 {
@@ -322,6 +324,7 @@ fn a_bad_command_never_moves_the_arm() {
         for (now, before) in rig.out.arm.position.iter().zip(before) {
             assert!((now - before).abs() < 1e-3, "{name}: {now} {before}");
         }
+        assert_eq!(rig.out.arm.effector.command_id, 0, "{name}: nor does it move the tool");
         rig.command = JointCommand { header: rig.command.header, ..good };
         rig.cycles(2);
         assert!(rig.out.arm.fault.is(PlantFault::None), "{name}: a good command opens the brakes");

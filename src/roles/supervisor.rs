@@ -7,7 +7,7 @@ use tandem_msg::{
 };
 
 use super::{Ports, service};
-use crate::supervisor::{RoleHealth, Supervisor, SupervisorInputs, SupervisorOutputs};
+use crate::supervisor::{RoleHealth, Summary, Supervisor, SupervisorInputs, SupervisorOutputs};
 
 /// The supervisor with its ports.
 pub struct SupervisorRole<P: Ports> {
@@ -91,6 +91,11 @@ impl<P: Ports> SupervisorRole<P> {
     /// The measured state of the arm as it was last read.
     pub fn arm(&self) -> &JointState {
         self.arm.held()
+    }
+
+    /// The numbers of the run so far.
+    pub fn summary(&self) -> Summary {
+        self.supervisor.summary()
     }
 
     /// Messages that reached nobody because the bus had no room.

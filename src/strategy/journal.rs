@@ -29,9 +29,7 @@ impl StepState {
 
     /// The state of that word.
     pub fn named(name: &str) -> Option<Self> {
-        [Self::Started, Self::Done, Self::TakenOver, Self::Failed]
-            .into_iter()
-            .find(|state| state.name() == name)
+        [Self::Started, Self::Done, Self::TakenOver, Self::Failed].into_iter().find(|state| state.name() == name)
     }
 }
 

@@ -10,7 +10,7 @@ use tandem_config::{AssemblyMode, Focus, Range, StrategyRow};
 use tandem_msg::{FeatureClass, Tool};
 
 /// A row below this fits too badly to be used unasked.
-pub const SCORE_MIN: f64 = 0.6;
+pub(super) const SCORE_MIN: f64 = 0.6;
 
 /// The question: what was recognised, how it is joined, and who is to do it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,19 +57,10 @@ pub struct NoMatch {
 
 impl fmt::Display for NoMatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Situation {
-            class,
-            mode,
-            tool,
-            focus,
-            ..
-        } = self.situation;
+        let Situation { class, mode, tool, focus, .. } = self.situation;
         write!(f, "no {focus}-focused strategy for {class}, {mode}, {tool}")?;
         match &self.nearest {
-            Some((id, score)) => write!(
-                f,
-                "; nearest is {id} with score {score:.2}, needed {SCORE_MIN:.2}"
-            ),
+            Some((id, score)) => write!(f, "; nearest is {id} with score {score:.2}, needed {SCORE_MIN:.2}"),
             None => f.write_str("; the library has no row of that kind"),
         }
     }
@@ -103,24 +94,18 @@ impl Library {
         let mut best: Option<(f64, f64, &StrategyRow)> = None;
         for row in self.rows.iter().filter(|row| applies(row, situation)) {
             let score = score(row, situation);
-            let width = row.distance.max - row.distance.min + row.mass.max - row.mass.min
-                + row.diameter.max
-                - row.diameter.min;
+            let width =
+                row.distance.max - row.distance.min + row.mass.max - row.mass.min + row.diameter.max - row.diameter.min;
             let better = best.is_none_or(|(s, w, _)| score > s || (score == s && width < w));
             if score.is_finite() && better {
                 best = Some((score, width, row));
             }
         }
         match best {
-            Some((score, _, row)) if score >= SCORE_MIN => Ok(Match {
-                row: row.clone(),
-                score,
-                explanation: explain(row, situation),
-            }),
-            _ => Err(NoMatch {
-                situation: *situation,
-                nearest: best.map(|(score, _, row)| (row.id.clone(), score)),
-            }),
+            Some((score, _, row)) if score >= SCORE_MIN => {
+                Ok(Match { row: row.clone(), score, explanation: explain(row, situation) })
+            }
+            _ => Err(NoMatch { situation: *situation, nearest: best.map(|(score, _, row)| (row.id.clone(), score)) }),
         }
     }
 }
@@ -130,9 +115,7 @@ fn applies(row: &StrategyRow, situation: &Situation) -> bool {
         && row.mode == situation.mode
         && row.tool == situation.tool
         && row.focus == situation.focus
-        && row
-            .flexible
-            .is_none_or(|flexible| flexible == situation.flexible)
+        && row.flexible.is_none_or(|flexible| flexible == situation.flexible)
 }
 
 fn score(row: &StrategyRow, situation: &Situation) -> f64 {
@@ -147,11 +130,8 @@ fn membership(range: &Range, value: f64) -> f64 {
     if range.contains(value) {
         return 1.0;
     }
-    let (excess, bound) = if value > range.max {
-        (value - range.max, range.max)
-    } else {
-        (range.min - value, range.min)
-    };
+    let (excess, bound) =
+        if value > range.max { (value - range.max, range.max) } else { (range.min - value, range.min) };
     (-2.0 * excess / bound.abs().max(1e-3)).exp()
 }
 
@@ -165,11 +145,7 @@ fn explain(row: &StrategyRow, situation: &Situation) -> String {
     ] {
         if *range != Range::ALL {
             let (min, max, value) = (range.min * scale, range.max * scale, value * scale);
-            let verb = if range.contains(value / scale) {
-                "in"
-            } else {
-                "outside"
-            };
+            let verb = if range.contains(value / scale) { "in" } else { "outside" };
             out.push_str(&format!(", {name} {value:.2} {unit} {verb} {min}..={max}"));
         }
     }
@@ -205,61 +181,31 @@ pub(crate) mod tests {
     #[test]
     fn mass_and_distance_choose_the_form() {
         let library = Library::new(shipped().strategies);
-        let form = |situation| {
-            library
-                .retrieve(&situation)
-                .map(|found| (found.row.form, found.score))
-        };
+        let form = |situation| library.retrieve(&situation).map(|found| (found.row.form, found.score));
         assert_eq!(form(cable()), Ok((Form::Hold, 1.0)));
-        assert_eq!(
-            form(Situation {
-                mass: 0.4,
-                ..cable()
-            }),
-            Ok((Form::HandOver, 1.0))
-        );
-        assert_eq!(
-            form(Situation {
-                mass: 0.4,
-                distance: 0.7,
-                ..cable()
-            }),
-            Ok((Form::Alone, 1.0))
-        );
+        assert_eq!(form(Situation { mass: 0.4, ..cable() }), Ok((Form::HandOver, 1.0)));
+        assert_eq!(form(Situation { mass: 0.4, distance: 0.7, ..cable() }), Ok((Form::Alone, 1.0)));
     }
 
     #[test]
     fn an_answer_explains_itself() {
         let library = Library::new(shipped().strategies);
         let found = library.retrieve(&cable()).map(|found| found.explanation);
-        assert_eq!(
-            found.as_deref(),
-            Ok("cone taper with parallel_gripper, mass 2.40 kg in 2..=8")
-        );
+        assert_eq!(found.as_deref(), Ok("cone taper with parallel_gripper, mass 2.40 kg in 2..=8"));
     }
 
     #[test]
     fn what_is_not_known_is_said() {
         let library = Library::new(shipped().strategies);
-        let question = Situation {
-            focus: Focus::Robot,
-            ..cable()
-        };
-        let message = library
-            .retrieve(&question)
-            .map_err(|error| error.to_string());
+        let question = Situation { focus: Focus::Robot, ..cable() };
+        let message = library.retrieve(&question).map_err(|error| error.to_string());
         assert_eq!(
             message.map(|found| found.row.id),
-            Err("no robot-focused strategy for cone, taper, parallel_gripper; the library has no row of that kind".into())
+            Err("no robot-focused strategy for cone, taper, parallel_gripper; the library has no row of that kind"
+                .into())
         );
-        let question = Situation {
-            mass: f64::NAN,
-            ..cable()
-        };
-        assert!(
-            library.retrieve(&question).is_err(),
-            "a mass that is not finite matches nothing"
-        );
+        let question = Situation { mass: f64::NAN, ..cable() };
+        assert!(library.retrieve(&question).is_err(), "a mass that is not finite matches nothing");
     }
 
     proptest! {

@@ -41,11 +41,7 @@ pub fn join(table: &[ReferenceRow], seen: &Seen) -> Option<Joining> {
             && !(seen.oily && row.tool == Tool::VacuumGripper)
     };
     let row = table.iter().find(fits)?;
-    Some(Joining {
-        mode: row.mode,
-        tool: row.tool,
-        effort: row.effort,
-    })
+    Some(Joining { mode: row.mode, tool: row.tool, effort: row.effort })
 }
 
 #[cfg(test)]
@@ -62,19 +58,10 @@ mod tests {
         for &class in FeatureClass::ALL {
             for (oily, flexible) in [(false, false), (false, true), (true, false), (true, true)] {
                 for diameter in [0.0, 0.004, 0.010, 0.0105, 0.02, 0.1] {
-                    let seen = Seen {
-                        class,
-                        diameter,
-                        length: 0.05,
-                        oily,
-                        flexible,
-                    };
+                    let seen = Seen { class, diameter, length: 0.05, oily, flexible };
                     let joining = join(&cell.reference, &seen);
                     assert!(joining.is_some(), "{seen:?}");
-                    assert!(
-                        !oily || joining.is_some_and(|found| found.tool != Tool::VacuumGripper),
-                        "{seen:?}"
-                    );
+                    assert!(!oily || joining.is_some_and(|found| found.tool != Tool::VacuumGripper), "{seen:?}");
                 }
             }
         }
@@ -83,13 +70,7 @@ mod tests {
     #[test]
     fn a_measurement_that_is_not_finite_fits_no_row() {
         let cell = shipped();
-        let seen = Seen {
-            class: FeatureClass::Cone,
-            diameter: f64::NAN,
-            length: 0.0,
-            oily: false,
-            flexible: false,
-        };
+        let seen = Seen { class: FeatureClass::Cone, diameter: f64::NAN, length: 0.0, oily: false, flexible: false };
         assert_eq!(join(&cell.reference, &seen), None);
     }
 
@@ -97,19 +78,10 @@ mod tests {
     fn the_diameter_decides_between_press_and_insert() {
         let cell = shipped();
         let pin = |diameter| {
-            let seen = Seen {
-                class: FeatureClass::SmoothAxis,
-                diameter,
-                length: 0.0,
-                oily: false,
-                flexible: false,
-            };
+            let seen = Seen { class: FeatureClass::SmoothAxis, diameter, length: 0.0, oily: false, flexible: false };
             join(&cell.reference, &seen).map(|joining| (joining.mode, joining.tool))
         };
         assert_eq!(pin(0.008), Some((AssemblyMode::Press, Tool::PressTool)));
-        assert_eq!(
-            pin(0.020),
-            Some((AssemblyMode::Insert, Tool::ParallelGripper))
-        );
+        assert_eq!(pin(0.020), Some((AssemblyMode::Insert, Tool::ParallelGripper)));
     }
 }

@@ -8,6 +8,7 @@ mod brake;
 mod error;
 mod extremal;
 mod input;
+mod instant;
 mod profile;
 mod reach;
 mod root;

@@ -2,19 +2,23 @@
 
 use crate::{
     extremal::Phase,
+    instant::Instant,
     state::{Limits, State},
 };
 
-/// Room for a prefix of 2, a mixture of two extremal motions of 7 phases, and the end state.
-pub(crate) const SEGMENTS_MAX: usize = 16;
+/// Room for a prefix, a mixture of two extremal motions of 7 phases, and the end state.
+///
+/// Two motions of 7 phases have 12 switching times, hence 13 segments. A prefix of one step adds one.
+/// A prefix of two ends waiting at an acceleration limit, so one of the motions lacks its first phase.
+pub(crate) const SEGMENTS_MAX: usize = 15;
 
 /// One constant-jerk segment of a joint's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Segment {
     /// Time at which it starts, in seconds from the start of the trajectory.
     pub start_time: f64,
-    /// How long it lasts, in seconds; infinite for the end state. Taken from the change of the state
-    /// where that is more exact than the difference of the start times, as in a long trajectory.
+    /// How long it lasts, in seconds, to more digits than the difference of start times has; infinite
+    /// for the end state.
     pub duration: f64,
     /// State at its start.
     pub start: State,
@@ -22,38 +26,37 @@ pub struct Segment {
     pub jerk: f64,
 }
 
-/// The motion of one joint: at most 15 constant-jerk segments, and the end state, which continues
+/// The motion of one joint: at most 14 constant-jerk segments, and the end state, which continues
 /// with constant acceleration.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
-    /// Start times, rising: from the start of the motion in its first half, and negative, from its
-    /// end, in the second, so that short segments at either end are as exact as their durations
-    /// however long the motion is. Infinite where unused.
+    /// Start times, rising; infinite where unused.
     times: [f64; SEGMENTS_MAX],
     positions: [f64; SEGMENTS_MAX],
     velocities: [f64; SEGMENTS_MAX],
     accelerations: [f64; SEGMENTS_MAX],
+    /// What the start times are short of.
+    rests: [f32; SEGMENTS_MAX],
+    /// Keeps the layout free of hidden padding.
+    reserved: u32,
     /// Jerk of the two motions mixed here where they rise and where they fall.
     jerk_rise: f64,
     jerk_fall: f64,
     /// Weight of the first of the two motions.
     share: f64,
-    /// Time of the end state.
-    duration: f64,
     /// Own minimum duration.
     minimum: f64,
-    /// 3 (slope of the first motion + 1) + (slope of the second + 1).
-    slopes: [u8; SEGMENTS_MAX],
-    count: u8,
-    reserved: [u8; 7],
+    /// Four bits a segment: the slope code of the first motion, that of the second (two bits each, 0
+    /// constant, 1 rising, 2 falling). The highest four bits count the segments, end state included.
+    codes: u64,
 }
 
 impl Profile {
     /// A joint that goes on with constant acceleration from `state`.
     pub(crate) fn drifting(state: State) -> Self {
         let mut profile = Self::empty(&Limits::default());
-        profile.finish(0.0, state);
+        profile.finish(Instant::default(), state);
         profile
     }
 
@@ -63,32 +66,36 @@ impl Profile {
             positions: [0.0; SEGMENTS_MAX],
             velocities: [0.0; SEGMENTS_MAX],
             accelerations: [0.0; SEGMENTS_MAX],
+            rests: [0.0; SEGMENTS_MAX],
+            reserved: 0,
             jerk_rise: limits.jerk_max,
             jerk_fall: limits.jerk_min,
             share: 1.0,
-            duration: 0.0,
             minimum: 0.0,
-            slopes: [4; SEGMENTS_MAX],
-            count: 0,
-            reserved: [0; 7],
+            codes: 0,
         }
     }
 
-    fn push(&mut self, time: f64, state: State, far: i8, near: i8) {
-        let place = usize::from(self.count);
+    fn count(&self) -> usize {
+        ((self.codes >> 60) as usize).min(SEGMENTS_MAX)
+    }
+
+    fn push(&mut self, start: Instant, state: State, slopes: Slopes) {
+        let place = self.count();
         if place < SEGMENTS_MAX {
-            self.times[place] = time;
+            self.times[place] = start.time;
+            self.rests[place] = start.rest as f32;
             self.positions[place] = state.position;
             self.velocities[place] = state.velocity;
             self.accelerations[place] = state.acceleration;
-            self.slopes[place] = (3 * (far + 1) + near + 1) as u8;
-            self.count += 1;
+            self.codes |= slopes.code() << (4 * place);
+            self.codes += 1 << 60;
         }
     }
 
     /// Appends the steps of a prefix; returns its duration and the position it ends at.
     pub(crate) fn prefix(&mut self, steps: &[Phase; 2], position: f64) -> (f64, f64) {
-        let (mut time, mut position) = (0.0, position);
+        let (mut now, mut position) = (Instant::default(), position);
         for step in steps {
             if step.duration > 0.0 {
                 let state = State {
@@ -96,18 +103,21 @@ impl Profile {
                     velocity: step.velocity,
                     acceleration: step.acceleration,
                 };
-                self.push(time, state, step.slope, step.slope);
-                position = state
-                    .advanced(step.duration, self.jerk_of(step.slope))
-                    .position;
-                time += step.duration;
+                let slopes = Slopes {
+                    far: step.slope,
+                    near: step.slope,
+                };
+                self.push(now, state, slopes);
+                position = state.advanced(step.duration, self.jerk(slopes)).position;
+                now = now.after(step.duration);
             }
         }
-        (time, position)
+        (now.time, position)
     }
 
     /// Appends the mixture of two motions of the same duration `time`, `near` given with its signs
-    /// turned, from `begin` and `position` on; returns the position it ends at.
+    /// turned, from `begin` and `position` on; returns when it ends and the
+    /// position there.
     pub(crate) fn mix(
         &mut self,
         far: &[Phase; 7],
@@ -116,63 +126,55 @@ impl Profile {
         begin: f64,
         time: f64,
         position: f64,
-    ) -> f64 {
+    ) -> (Instant, f64) {
         self.share = share;
-        self.duration = begin + time;
-        let mut motions = [Walk::new(far, 1.0, time), Walk::new(near, -1.0, time)];
+        let mut motions = [
+            Walk::new(far, 1, begin, time),
+            Walk::new(near, -1, begin, time),
+        ];
         if share >= 1.0 {
             motions[1] = motions[0];
         } else if share <= 0.0 {
             motions[0] = motions[1];
         }
-        let half = time / 2.0;
-        let (mut now, mut left, mut position) = (0.0, time, position);
+        let (mut now, mut position) = (Instant::at(begin), position);
         // Each pass ends a phase of one of the motions: 14 at most.
         for _ in 0..14 {
             let [first, second] = &motions;
-            let (Some(a), Some(b)) = (first.phase(), second.phase()) else {
-                break;
-            };
-            let (a_slope, b_slope) = (a.slope * first.sign(), b.slope * second.sign());
-            let (until, until_left) = if first.end() <= second.end() {
-                (first.end(), first.left())
+            let (a, b) = (first.end(), second.end());
+            let until = if first.ended() || (!second.ended() && b.since(a) < 0.0) {
+                b
             } else {
-                (second.end(), second.left())
+                a
             };
-            if until > now {
-                let (a_state, b_state) = (
-                    first.state(a, now, self.jerk_of(a_slope)),
-                    second.state(b, now, self.jerk_of(b_slope)),
+            if first.ended() && second.ended() {
+                break;
+            }
+            let passed = until.since(now);
+            if passed > 0.0 {
+                let slopes = Slopes {
+                    far: first.slope(),
+                    near: second.slope(),
+                };
+                let (a, b) = (
+                    first.state(now, |slope| self.jerk_of(slope)),
+                    second.state(now, |slope| self.jerk_of(slope)),
                 );
                 let state = State {
                     position,
-                    velocity: share * a_state[0] + (1.0 - share) * b_state[0],
-                    acceleration: share * a_state[1] + (1.0 - share) * b_state[1],
+                    velocity: share * a[0] + (1.0 - share) * b[0],
+                    acceleration: share * a[1] + (1.0 - share) * b[1],
                 };
-                let late = now > half && left > 0.0;
-                self.push(
-                    if late { -left } else { begin + now },
-                    state,
-                    a_slope,
-                    b_slope,
-                );
-                let passed = if now > half {
-                    left - until_left
-                } else if until > half {
-                    (time - until_left) - now
-                } else {
-                    until - now
-                };
-                position = state
-                    .advanced(passed, self.jerk_mixed(a_slope, b_slope))
-                    .position;
-                (now, left) = (until, until_left);
+                // A last sliver left by rounding does not start past the end.
+                self.push(now.read_as(now.time.min(begin + time)), state, slopes);
+                position = state.advanced(passed, self.jerk(slopes)).position;
+                now = until;
             }
             for motion in &mut motions {
-                motion.pass(now);
+                motion.pass(until);
             }
         }
-        position
+        (now, position)
     }
 
     /// The motion `start + direction * self`, which ends with the velocity and acceleration of
@@ -186,11 +188,12 @@ impl Profile {
         minimum: f64,
     ) -> Self {
         let mut scaled = *self;
-        for place in 0..usize::from(self.count).min(SEGMENTS_MAX) {
+        let count = self.count();
+        for place in 0..count {
             scaled.positions[place] = start + direction * self.positions[place];
             scaled.velocities[place] = direction * self.velocities[place];
             scaled.accelerations[place] = direction * self.accelerations[place];
-            if self.times[place] >= self.duration {
+            if place + 1 == count {
                 if held {
                     scaled.positions[place] = target.position;
                 }
@@ -204,10 +207,9 @@ impl Profile {
         scaled
     }
 
-    /// Ends the motion at `time` in `state`.
-    pub(crate) fn finish(&mut self, time: f64, state: State) {
-        self.duration = time;
-        self.push(time, state, 0, 0);
+    /// Ends the motion at `end` in `state`.
+    pub(crate) fn finish(&mut self, end: Instant, state: State) {
+        self.push(end, state, Slopes { far: 0, near: 0 });
     }
 
     pub(crate) fn set_minimum(&mut self, minimum: f64) {
@@ -222,42 +224,13 @@ impl Profile {
         }
     }
 
-    fn jerk_mixed(&self, far: i8, near: i8) -> f64 {
-        let (far, near) = (self.jerk_of(far), self.jerk_of(near));
-        if far == near {
+    fn jerk(&self, slopes: Slopes) -> f64 {
+        let (far, near) = (self.jerk_of(slopes.far), self.jerk_of(slopes.near));
+        if slopes.far == slopes.near {
             far
         } else {
             self.share * far + (1.0 - self.share) * near
         }
-    }
-
-    /// Segment `index`, or `None` past the end state. The last one is the end state, with no jerk.
-    #[must_use]
-    pub fn segment(&self, index: usize) -> Option<Segment> {
-        if index >= usize::from(self.count) || index >= SEGMENTS_MAX {
-            return None;
-        }
-        let (time, next) = (self.times[index], index + 1);
-        let duration = if next < usize::from(self.count).min(SEGMENTS_MAX) {
-            match (time, self.times[next]) {
-                (time, end) if time >= 0.0 && end < 0.0 => (self.duration + end) - time,
-                (time, end) if time < 0.0 && end >= 0.0 => -time,
-                (time, end) => end - time,
-            }
-        } else {
-            f64::INFINITY
-        };
-        let code = self.slopes[index] as i8;
-        Some(Segment {
-            start_time: if time < 0.0 {
-                self.duration + time
-            } else {
-                time
-            },
-            duration,
-            start: self.state(index),
-            jerk: self.jerk_mixed(code / 3 - 1, code % 3 - 1),
-        })
     }
 
     fn state(&self, index: usize) -> State {
@@ -268,6 +241,34 @@ impl Profile {
         }
     }
 
+    fn instant(&self, index: usize) -> Instant {
+        Instant {
+            time: self.times[index],
+            rest: f64::from(self.rests[index]),
+        }
+    }
+
+    /// Segment `index`, or `None` past the end state. The last one is the end state, with no jerk.
+    #[must_use]
+    pub fn segment(&self, index: usize) -> Option<Segment> {
+        if index >= self.count() {
+            return None;
+        }
+        let next = index + 1;
+        let duration = if next < self.count() {
+            self.instant(next).since(self.instant(index))
+        } else {
+            f64::INFINITY
+        };
+        let jerk = self.jerk(Slopes::of(self.codes, index));
+        Some(Segment {
+            start_time: self.times[index],
+            duration,
+            start: self.state(index),
+            jerk,
+        })
+    }
+
     /// The segments in order, the end state last.
     pub fn segments(&self) -> impl Iterator<Item = Segment> + '_ {
         (0..SEGMENTS_MAX).map_while(|index| self.segment(index))
@@ -276,7 +277,10 @@ impl Profile {
     /// When this joint reaches its target.
     #[must_use]
     pub fn duration(&self) -> f64 {
-        self.duration
+        match self.count() {
+            count @ 1..=SEGMENTS_MAX => self.times[count - 1],
+            _ => 0.0,
+        }
     }
 
     /// The shortest time in which this joint alone could reach its target, in seconds.
@@ -289,19 +293,44 @@ impl Profile {
     #[must_use]
     #[inline]
     pub fn at(&self, time: f64) -> State {
-        let early = time.max(0.0);
-        let late = early - self.duration;
+        let time = time.max(0.0);
         let passed = self
             .times
             .iter()
-            .map(|&start| usize::from(start <= if start < 0.0 { late } else { early }))
+            .map(|&start| usize::from(start <= time))
             .sum::<usize>();
         let index = (passed.max(1) - 1).min(SEGMENTS_MAX - 1);
-        let code = self.slopes[index] as i8;
-        let start = self.times[index];
-        let since = if start < 0.0 { late } else { early } - start;
-        self.state(index)
-            .advanced(since, self.jerk_mixed(code / 3 - 1, code % 3 - 1))
+        self.state(index).advanced(
+            time - self.times[index],
+            self.jerk(Slopes::of(self.codes, index)),
+        )
+    }
+}
+
+/// How the accelerations of the two mixed motions change: +1 rising, 0 constant, -1 falling.
+#[derive(Clone, Copy)]
+struct Slopes {
+    far: i8,
+    near: i8,
+}
+
+impl Slopes {
+    fn code(self) -> u64 {
+        let code = |slope: i8| match slope {
+            1 => 1,
+            -1 => 2,
+            _ => 0,
+        };
+        code(self.far) | code(self.near) << 2
+    }
+
+    fn of(codes: u64, index: usize) -> Self {
+        let code = codes >> (4 * index);
+        let slope = |code: u64| (code & 1) as i8 - (code >> 1 & 1) as i8;
+        Slopes {
+            far: slope(code),
+            near: slope(code >> 2),
+        }
     }
 }
 
@@ -310,69 +339,86 @@ impl Profile {
 struct Walk<'a> {
     phases: &'a [Phase; 7],
     index: usize,
-    /// When each phase starts, and how much time is left then.
-    starts: [f64; 8],
-    lefts: [f64; 8],
-    direction: f64,
+    /// When each phase starts.
+    starts: [Instant; 8],
+    /// The last phase that has a duration.
+    last: usize,
+    sign: i8,
 }
 
 impl<'a> Walk<'a> {
-    fn new(phases: &'a [Phase; 7], direction: f64, time: f64) -> Self {
+    /// The phases one after the other, from `begin` to `begin + time`.
+    ///
+    /// The durations add up to `time` but for rounding. That goes into the longest phase of constant
+    /// acceleration, where it does least harm: the phases before it are timed from the beginning, those
+    /// after it from the end. Without such a phase the motion ends a rounding early or late.
+    fn new(phases: &'a [Phase; 7], sign: i8, begin: f64, time: f64) -> Self {
+        let mut starts = [Instant::at(begin); 8];
+        let (mut pivot, mut longest, mut last) = (7, 0.0, 0);
+        for (index, phase) in phases.iter().enumerate() {
+            if phase.slope == 0 && phase.duration > longest {
+                (pivot, longest) = (index, phase.duration);
+            }
+            if phase.duration > 0.0 {
+                last = index;
+            }
+            starts[index + 1] = starts[index].after(phase.duration.max(0.0));
+        }
+        if pivot < 7 {
+            starts[7] = Instant::at(begin + time);
+            for index in (pivot + 1..7).rev() {
+                starts[index] = starts[index + 1].after(-phases[index].duration.max(0.0));
+            }
+        }
         let mut walk = Walk {
             phases,
             index: 0,
-            starts: [0.0; 8],
-            lefts: [0.0; 8],
-            direction,
+            starts,
+            last,
+            sign,
         };
-        for index in 0..7 {
-            walk.starts[index + 1] = walk.starts[index] + phases[index].duration.max(0.0);
-            walk.lefts[6 - index] = walk.lefts[7 - index] + phases[6 - index].duration.max(0.0);
-        }
-        // The two ways of adding up differ by roundings; each motion ends at `time` exactly.
-        for index in 0..8 {
-            if walk.lefts[index] == 0.0 || walk.starts[index] > time {
-                walk.starts[index] = time;
-            }
-        }
-        walk.pass(0.0);
+        walk.pass(Instant::at(begin));
         walk
     }
 
-    fn phase(&self) -> Option<&'a Phase> {
-        self.phases.get(self.index)
+    fn ended(&self) -> bool {
+        self.index >= 7
     }
 
-    /// When the current phase ends, and how much time is left then.
-    fn end(&self) -> f64 {
+    /// When the current phase ends.
+    fn end(&self) -> Instant {
         self.starts[(self.index + 1).min(7)]
     }
 
-    fn left(&self) -> f64 {
-        self.lefts[(self.index + 1).min(7)]
-    }
-
-    fn sign(&self) -> i8 {
-        if self.direction > 0.0 { 1 } else { -1 }
+    /// How the acceleration changes, as seen with the signs of the joint.
+    fn slope(&self) -> i8 {
+        self.phases
+            .get(self.index)
+            .map_or(0, |phase| self.sign * phase.slope)
     }
 
     /// Moves on past every phase that has ended at `time`.
-    fn pass(&mut self, time: f64) {
-        while self.index < 7 && self.end() <= time {
+    fn pass(&mut self, time: Instant) {
+        while self.index < 7 && self.end().since(time) <= 0.0 {
             self.index += 1;
         }
     }
 
-    /// Velocity and acceleration at `time` within `phase`, whose jerk with sign is `jerk`.
-    fn state(&self, phase: &Phase, time: f64, jerk: f64) -> [f64; 2] {
-        let passed = time - self.starts[self.index.min(7)];
-        let (velocity, acceleration) = (
-            self.direction * phase.velocity,
-            self.direction * phase.acceleration,
-        );
+    /// Velocity and acceleration at `now`, given the jerk of a slope; past the last phase, those at its
+    /// end.
+    fn state(&self, now: Instant, jerk: impl Fn(i8) -> f64) -> [f64; 2] {
+        let (index, now) = if self.ended() {
+            (self.last, self.starts[7])
+        } else {
+            (self.index.min(6), now)
+        };
+        let (phase, sign) = (&self.phases[index], f64::from(self.sign));
+        let (velocity, acceleration) = (sign * phase.velocity, sign * phase.acceleration);
+        let passed = now.since(self.starts[index]);
         if passed <= 0.0 {
             return [velocity, acceleration];
         }
+        let jerk = jerk(self.sign * phase.slope);
         [
             velocity + passed * (acceleration + passed * jerk / 2.0),
             acceleration + passed * jerk,

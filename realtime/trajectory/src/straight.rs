@@ -66,7 +66,7 @@ impl<const N: usize> Line<N> {
                 .filter(|(i, _)| members[*i])
                 .fold(0.0_f64, |most, (_, value)| most.max(value.abs()));
             for (i, value) in quantity.iter().enumerate() {
-                if members[i] && !((value - direction[i] * quantity[leader]).abs() <= TIE * reach) {
+                if members[i] && (value - direction[i] * quantity[leader]).abs() > TIE * reach {
                     return Err(Error::NotStraight { joint: i });
                 }
             }

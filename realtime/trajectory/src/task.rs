@@ -28,6 +28,8 @@ pub(crate) struct Task {
     pub(crate) minimum: f64,
 }
 
+// Boxing the larger variant would allocate in a cycle.
+#[allow(clippy::large_enum_variant)]
 #[derive(Clone, Copy, Debug)]
 enum Goal {
     Position(Reach),
@@ -112,7 +114,7 @@ impl Task {
                     reach.far.phases(&mixture.far),
                     reach.near.phases(&mixture.near),
                 );
-                profile.mix(
+                let (end, _) = profile.mix(
                     &far,
                     &near,
                     mixture.share,
@@ -120,7 +122,7 @@ impl Task {
                     duration - begin,
                     position,
                 );
-                profile.finish(duration, self.target);
+                profile.finish(end.read_as(duration), self.target);
             }
             Goal::Velocity(swing, _) => {
                 let velocity = self.brake.end[0];
@@ -131,9 +133,10 @@ impl Task {
                 } else {
                     1.0
                 };
-                let position = profile.mix(&far, &near, share, begin, duration - begin, position);
+                let (end, position) =
+                    profile.mix(&far, &near, share, begin, duration - begin, position);
                 profile.finish(
-                    duration,
+                    end.read_as(duration),
                     State {
                         position,
                         ..self.target

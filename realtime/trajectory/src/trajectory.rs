@@ -82,6 +82,9 @@ impl<const N: usize> Trajectory<N> {
     }
 }
 
+// Fit for shared memory: a seven-joint trajectory takes no more than a page.
+const _: () = assert!(size_of::<Trajectory<7>>() <= 4096);
+
 /// What has been found about each joint before a duration is chosen.
 struct Plan<const N: usize> {
     tasks: [Option<Task>; N],

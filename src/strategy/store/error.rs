@@ -7,9 +7,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum StoreError {
     /// The URL names no database this program speaks to.
-    #[error(
-        "store.url = \"{url}\", allowed sqlite://FILE or mysql://USER@HOST/DATABASE; write it so"
-    )]
+    #[error("store.url = \"{url}\", allowed sqlite://FILE or mysql://USER@HOST/DATABASE; write it so")]
     Url {
         /// The URL, password hidden.
         url: String,
@@ -31,9 +29,7 @@ pub enum StoreError {
     #[error("the store's runtime cannot start: {0}; see the process's limits")]
     Runtime(std::io::Error),
     /// The database did not answer in time.
-    #[error(
-        "{url}: could not {what} within {limit_s} s; see whether the server runs and its disk is not full"
-    )]
+    #[error("{url}: could not {what} within {limit_s} s; see whether the server runs and its disk is not full")]
     Timeout {
         /// The URL, password hidden.
         url: String,
@@ -43,9 +39,7 @@ pub enum StoreError {
         limit_s: u64,
     },
     /// Another process holds the migration lock.
-    #[error(
-        "another process has been changing the store's tables for 30 s; wait for it, or end it, and start again"
-    )]
+    #[error("another process has been changing the store's tables for 30 s; wait for it, or end it, and start again")]
     Locked,
     /// An earlier migration was interrupted.
     #[error(
@@ -129,11 +123,6 @@ impl StoreError {
         } else {
             "see whether the database runs and the URL is right"
         };
-        Self::Failed {
-            url: shown(url),
-            what,
-            why,
-            advice,
-        }
+        Self::Failed { url: shown(url), what, why, advice }
     }
 }

@@ -2,8 +2,8 @@
 
 use super::error::StoreError;
 use crate::strategy::{JournalEntry, StepState};
-use sqlx::Row;
 use sqlx::AnyPool;
+use sqlx::Row;
 
 /// A run as it is recorded when it begins.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -27,10 +27,7 @@ pub struct RunRecord {
 pub(super) async fn begin(pool: &AnyPool, run: &RunRecord) -> Result<(), StoreError> {
     let mut transaction = pool.begin().await?;
     let id = run.id.to_lowercase();
-    let known = sqlx::query("SELECT id FROM run WHERE id = ?")
-        .bind(&id)
-        .fetch_optional(&mut *transaction)
-        .await?;
+    let known = sqlx::query("SELECT id FROM run WHERE id = ?").bind(&id).fetch_optional(&mut *transaction).await?;
     if known.is_none() {
         sqlx::query("INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
             .bind(&id)
@@ -49,9 +46,7 @@ pub(super) async fn begin(pool: &AnyPool, run: &RunRecord) -> Result<(), StoreEr
 }
 
 pub(super) async fn end(pool: &AnyPool, run: &str, outcome: &str) -> Result<(), StoreError> {
-    let update = sqlx::query("UPDATE run SET outcome = ? WHERE id = ?")
-        .bind(outcome)
-        .bind(run.to_lowercase());
+    let update = sqlx::query("UPDATE run SET outcome = ? WHERE id = ?").bind(outcome).bind(run.to_lowercase());
     update.execute(pool).await?;
     Ok(())
 }
@@ -128,8 +123,7 @@ fn check(entry: &JournalEntry) -> Result<(), StoreError> {
 }
 
 pub(super) async fn read(pool: &AnyPool, run: &str) -> Result<Vec<JournalEntry>, StoreError> {
-    let query = sqlx::query("SELECT * FROM step_journal WHERE run = ? ORDER BY seq")
-        .bind(run.to_lowercase());
+    let query = sqlx::query("SELECT * FROM step_journal WHERE run = ? ORDER BY seq").bind(run.to_lowercase());
     let mut entries = Vec::new();
     for row in query.fetch_all(pool).await? {
         let serial: String = row.try_get("serial")?;

@@ -14,11 +14,7 @@ const IMPORTED: &str = "imported";
 /// Makes the rows of origin `file` equal to `seeds`.
 pub(super) async fn sync(pool: &AnyPool, seeds: &[StrategyRow]) -> Result<(), StoreError> {
     seeds.iter().try_for_each(check)?;
-    let mut stored = read_where(
-        pool,
-        "SELECT * FROM strategy WHERE origin = 'file' ORDER BY id",
-    )
-    .await?;
+    let mut stored = read_where(pool, "SELECT * FROM strategy WHERE origin = 'file' ORDER BY id").await?;
     let mut wanted = seeds.to_vec();
     wanted.sort_by(|a, b| a.id.cmp(&b.id));
     stored.sort_by(|a, b| a.id.cmp(&b.id));
@@ -56,19 +52,12 @@ pub(super) async fn read(pool: &AnyPool) -> Result<Vec<StrategyRow>, StoreError>
 }
 
 fn check(row: &StrategyRow) -> Result<(), StoreError> {
-    for (field, range) in [
-        ("diameter", row.diameter),
-        ("length", row.length),
-        ("distance", row.distance),
-        ("mass", row.mass),
-    ] {
+    for (field, range) in
+        [("diameter", row.diameter), ("length", row.length), ("distance", row.distance), ("mass", row.mass)]
+    {
         for value in [range.min, range.max] {
             if !value.is_finite() {
-                return Err(StoreError::NotFinite {
-                    key: format!("strategy {}", row.id),
-                    field,
-                    value,
-                });
+                return Err(StoreError::NotFinite { key: format!("strategy {}", row.id), field, value });
             }
         }
     }
@@ -76,22 +65,12 @@ fn check(row: &StrategyRow) -> Result<(), StoreError> {
 }
 
 async fn delete(transaction: &mut Transaction<'_, Any>, id: &str) -> Result<(), StoreError> {
-    sqlx::query("DELETE FROM strategy_action WHERE strategy_id = ?")
-        .bind(id)
-        .execute(&mut **transaction)
-        .await?;
-    sqlx::query("DELETE FROM strategy WHERE id = ?")
-        .bind(id)
-        .execute(&mut **transaction)
-        .await?;
+    sqlx::query("DELETE FROM strategy_action WHERE strategy_id = ?").bind(id).execute(&mut **transaction).await?;
+    sqlx::query("DELETE FROM strategy WHERE id = ?").bind(id).execute(&mut **transaction).await?;
     Ok(())
 }
 
-async fn insert(
-    transaction: &mut Transaction<'_, Any>,
-    row: &StrategyRow,
-    origin: &str,
-) -> Result<(), StoreError> {
+async fn insert(transaction: &mut Transaction<'_, Any>, row: &StrategyRow, origin: &str) -> Result<(), StoreError> {
     sqlx::query("INSERT INTO strategy VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")
         .bind(row.id.to_lowercase())
         .bind(origin)
@@ -125,25 +104,15 @@ async fn insert(
 
 async fn read_where(pool: &AnyPool, query: &'static str) -> Result<Vec<StrategyRow>, StoreError> {
     let mut actions: Vec<(String, Step)> = Vec::new();
-    for row in sqlx::query("SELECT * FROM strategy_action ORDER BY strategy_id, place")
-        .fetch_all(pool)
-        .await?
-    {
+    for row in sqlx::query("SELECT * FROM strategy_action ORDER BY strategy_id, place").fetch_all(pool).await? {
         let id: String = row.try_get("strategy_id")?;
-        let step = Step {
-            subject: word(&id, &row, "subject")?,
-            verb: word(&id, &row, "verb")?,
-        };
+        let step = Step { subject: word(&id, &row, "subject")?, verb: word(&id, &row, "verb")? };
         actions.push((id, step));
     }
     let mut rows = Vec::new();
     for row in sqlx::query(query).fetch_all(pool).await? {
         let id: String = row.try_get("id")?;
-        let steps = actions
-            .iter()
-            .filter(|(of, _)| *of == id)
-            .map(|(_, step)| *step)
-            .collect();
+        let steps = actions.iter().filter(|(of, _)| *of == id).map(|(_, step)| *step).collect();
         let flexible: i64 = row.try_get("flexible")?;
         rows.push(StrategyRow {
             class: word(&id, &row, "class")?,
@@ -151,22 +120,10 @@ async fn read_where(pool: &AnyPool, query: &'static str) -> Result<Vec<StrategyR
             tool: word(&id, &row, "tool")?,
             focus: word(&id, &row, "focus")?,
             form: word(&id, &row, "form")?,
-            diameter: Range {
-                min: row.try_get("diameter_min_m")?,
-                max: row.try_get("diameter_max_m")?,
-            },
-            length: Range {
-                min: row.try_get("length_min_m")?,
-                max: row.try_get("length_max_m")?,
-            },
-            distance: Range {
-                min: row.try_get("distance_min_m")?,
-                max: row.try_get("distance_max_m")?,
-            },
-            mass: Range {
-                min: row.try_get("mass_min_kg")?,
-                max: row.try_get("mass_max_kg")?,
-            },
+            diameter: Range { min: row.try_get("diameter_min_m")?, max: row.try_get("diameter_max_m")? },
+            length: Range { min: row.try_get("length_min_m")?, max: row.try_get("length_max_m")? },
+            distance: Range { min: row.try_get("distance_min_m")?, max: row.try_get("distance_max_m")? },
+            mass: Range { min: row.try_get("mass_min_kg")?, max: row.try_get("mass_max_kg")? },
             flexible: (flexible >= 0).then_some(flexible == 1),
             id,
             steps,
@@ -182,10 +139,6 @@ fn word<T: Coded>(id: &str, row: &AnyRow, field: &'static str) -> Result<T, Stor
         id: id.to_owned(),
         field,
         value,
-        allowed: T::ALL
-            .iter()
-            .map(|variant| variant.name())
-            .collect::<Vec<_>>()
-            .join(", "),
+        allowed: T::ALL.iter().map(|variant| variant.name()).collect::<Vec<_>>().join(", "),
     })
 }

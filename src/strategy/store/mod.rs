@@ -10,12 +10,14 @@
 //! **Invariant:** no password appears in a message.
 
 mod error;
+mod history;
 mod journal;
 mod library;
 mod schema;
 mod url;
 
 pub use error::StoreError;
+pub use history::PastRun;
 pub use journal::RunRecord;
 pub use url::{default_url, shown};
 
@@ -51,26 +53,14 @@ impl Store {
     pub fn open(url: &str, seeds: &[StrategyRow]) -> Result<Self, StoreError> {
         sqlx::any::install_default_drivers();
         let target = url::Target::parse(url)?;
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build()
-            .map_err(StoreError::Runtime)?;
+        let runtime =
+            tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(StoreError::Runtime)?;
         let pool = Self::within(&runtime, url, "open the database", connect(&target))?;
-        let store = Self {
-            runtime,
-            pool,
-            url: url.to_owned(),
-        };
+        let store = Self { runtime, pool, url: url.to_owned() };
         {
             let _lock = schema::FileLock::take(&target)?;
-            store.run(
-                "bring the tables up to date",
-                schema::migrate(&store.pool, &target),
-            )?;
-            store.run(
-                "store the strategy files",
-                library::sync(&store.pool, seeds),
-            )?;
+            store.run("bring the tables up to date", schema::migrate(&store.pool, &target))?;
+            store.run("store the strategy files", library::sync(&store.pool, seeds))?;
         }
         Ok(store)
     }
@@ -80,8 +70,7 @@ impl Store {
     /// # Errors
     /// The database does not answer, or a row holds a word this program does not know.
     pub fn library(&self) -> Result<Library, StoreError> {
-        self.run("read the strategy library", library::read(&self.pool))
-            .map(Library::new)
+        self.run("read the strategy library", library::read(&self.pool)).map(Library::new)
     }
 
     /// Adds rows of the user's own; a row of the same id is replaced.
@@ -105,10 +94,7 @@ impl Store {
     /// # Errors
     /// The database does not answer.
     pub fn end(&self, run: &str, outcome: &str) -> Result<(), StoreError> {
-        self.run(
-            "record the run's end",
-            journal::end(&self.pool, run, outcome),
-        )
+        self.run("record the run's end", journal::end(&self.pool, run, outcome))
     }
 
     /// Writes journal entries in one transaction; durable on return. An entry with a key
@@ -134,11 +120,7 @@ impl Store {
         shown(&self.url)
     }
 
-    fn run<T>(
-        &self,
-        what: &'static str,
-        work: impl Future<Output = Result<T, StoreError>>,
-    ) -> Result<T, StoreError> {
+    fn run<T>(&self, what: &'static str, work: impl Future<Output = Result<T, StoreError>>) -> Result<T, StoreError> {
         Self::within(&self.runtime, &self.url, what, work)
     }
 
@@ -153,11 +135,7 @@ impl Store {
             Ok(Ok(value)) => Ok(value),
             Ok(Err(StoreError::Database(source))) => Err(StoreError::failed(url, what, &source)),
             Ok(Err(other)) => Err(other),
-            Err(_) => Err(StoreError::Timeout {
-                url: shown(url),
-                what,
-                limit_s: OPERATION_MAX.as_secs(),
-            }),
+            Err(_) => Err(StoreError::Timeout { url: shown(url), what, limit_s: OPERATION_MAX.as_secs() }),
         }
     }
 }
@@ -166,9 +144,7 @@ impl Drop for Store {
     fn drop(&mut self) {
         let close = self.pool.close();
         // A server that hangs must not hang us as well.
-        let _ = self
-            .runtime
-            .block_on(async { tokio::time::timeout(Duration::from_secs(2), close).await });
+        let _ = self.runtime.block_on(async { tokio::time::timeout(Duration::from_secs(2), close).await });
     }
 }
 

@@ -33,11 +33,7 @@ impl FileLock {
             path: path.to_string_lossy().into_owned(),
             why: error.to_string(),
         };
-        let file = File::options()
-            .create(true)
-            .append(true)
-            .open(&path)
-            .map_err(fault)?;
+        let file = File::options().create(true).append(true).open(&path).map_err(fault)?;
         file.lock().map_err(fault)?;
         Ok(Self { _file: Some(file) })
     }
@@ -48,10 +44,7 @@ pub(super) async fn migrate(pool: &AnyPool, target: &Target) -> Result<(), Store
     if target.sqlite() {
         return run(&mut connection, target).await;
     }
-    let locked: Option<i64> = sqlx::query(LOCK)
-        .fetch_one(&mut *connection)
-        .await?
-        .try_get(0)?;
+    let locked: Option<i64> = sqlx::query(LOCK).fetch_one(&mut *connection).await?.try_get(0)?;
     if locked != Some(1) {
         return Err(StoreError::Locked);
     }
@@ -61,29 +54,15 @@ pub(super) async fn migrate(pool: &AnyPool, target: &Target) -> Result<(), Store
 }
 
 async fn run(connection: &mut PoolConnection<Any>, target: &Target) -> Result<(), StoreError> {
-    let mut migrator = Migrator {
-        migrations: MIGRATIONS.migrations.clone(),
-        ..Migrator::DEFAULT
-    };
+    let mut migrator = Migrator { migrations: MIGRATIONS.migrations.clone(), ..Migrator::DEFAULT };
     migrator.set_locking(false);
-    migrator
-        .run(&mut **connection)
-        .await
-        .map_err(|error| match error {
-            MigrateError::Dirty(version) => StoreError::Dirty {
-                url: shown(&target.url),
-                version,
-            },
-            MigrateError::VersionMismatch(version)
-            | MigrateError::VersionMissing(version)
-            | MigrateError::VersionTooNew(version, _)
-            | MigrateError::VersionTooOld(version, _) => StoreError::Version {
-                url: shown(&target.url),
-                version,
-            },
-            MigrateError::Execute(source) | MigrateError::ExecuteMigration(source, _) => {
-                StoreError::Database(source)
-            }
-            other => StoreError::Database(sqlx::Error::Migrate(Box::new(other))),
-        })
+    migrator.run(&mut **connection).await.map_err(|error| match error {
+        MigrateError::Dirty(version) => StoreError::Dirty { url: shown(&target.url), version },
+        MigrateError::VersionMismatch(version)
+        | MigrateError::VersionMissing(version)
+        | MigrateError::VersionTooNew(version, _)
+        | MigrateError::VersionTooOld(version, _) => StoreError::Version { url: shown(&target.url), version },
+        MigrateError::Execute(source) | MigrateError::ExecuteMigration(source, _) => StoreError::Database(source),
+        other => StoreError::Database(sqlx::Error::Migrate(Box::new(other))),
+    })
 }

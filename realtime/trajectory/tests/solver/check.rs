@@ -5,21 +5,21 @@ use tandem_trajectory::{Limits, Profile, State};
 
 /// How far a profile is from what was asked.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Faults {
+pub(crate) struct Faults {
     /// Errors of the end state.
-    pub position: f64,
-    pub velocity: f64,
-    pub acceleration: f64,
+    pub(crate) position: f64,
+    pub(crate) velocity: f64,
+    pub(crate) acceleration: f64,
     /// Largest excess over a limit once inside the limits, relative to the limit, or to 1 if that is more.
-    pub excess: f64,
+    pub(crate) excess: f64,
     /// Largest relative excess over the jerk limits.
-    pub jerk: f64,
+    pub(crate) jerk: f64,
     /// Largest distance of the evaluated position from the integrated one at a segment's end.
-    pub drift: f64,
+    pub(crate) drift: f64,
 }
 
 impl Faults {
-    pub fn merge(&mut self, other: &Faults) {
+    pub(crate) fn merge(&mut self, other: &Faults) {
         let largest = |a: &mut f64, b: f64| *a = if b.is_nan() { f64::INFINITY } else { a.max(b) };
         largest(&mut self.position, other.position);
         largest(&mut self.velocity, other.velocity);
@@ -42,7 +42,7 @@ fn advance([p, v, a]: [Exact; 3], time: f64, jerk: f64) -> [Exact; 3] {
 
 /// Checks `profile` from `start`. `target` is the end state; without a position if that is free, and
 /// then the velocity limits do not count.
-pub fn check(
+pub(crate) fn check(
     profile: &Profile,
     start: &State,
     target: &State,

@@ -1,11 +1,7 @@
 //! Against ruckig's C++: never longer than what it finds, and valid by an independent check.
 
-mod cases;
-mod check;
-mod exact;
-
-use cases::Case;
-use check::{Faults, check};
+use crate::cases::{self, Case};
+use crate::check::{Faults, check};
 use tandem_trajectory::{Error, Interface, Profile, Trajectory};
 
 fn solve<const N: usize>(case: &Case) -> Result<(f64, Vec<Profile>), Error> {
@@ -47,15 +43,14 @@ fn every_valid_case_is_solved_and_no_invalid_one() {
     }
 }
 
-/// Below 1e-4 s ruckig lives off its final tolerance of 1e-8 (it reaches targets one rounding away
-/// in no time), so its durations there bound nothing.
+/// In motions of less than a millisecond ruckig lives off its final tolerance of 1e-8 (it reaches
+/// targets one rounding away in no time), so its durations there bound nothing.
 #[test]
 fn no_duration_is_longer_than_the_verified_one() {
     for case in cases::load().iter().filter(|case| case.verified) {
         let (duration, profiles) = solve_any(case).expect("solved above");
         let loose = case.tag == "noise" || case.tag == "tiny";
-        let short = if case.tag == "noise" { 1e-3 } else { 1e-4 };
-        if !(loose && case.duration < short) {
+        if !(loose && case.duration < 2e-3) {
             assert!(
                 duration <= case.duration * (1.0 + 1e-9) + 1e-9,
                 "case {} ({}): {duration} > {}",
@@ -66,7 +61,7 @@ fn no_duration_is_longer_than_the_verified_one() {
         }
         for (index, (profile, joint)) in profiles.iter().zip(&case.joints).enumerate() {
             let minimum = profile.minimum_duration();
-            if !(loose && joint.minimum < short) {
+            if !(loose && joint.minimum < 2e-3) {
                 let bound = joint.minimum * (1.0 + 1e-9) + 1e-9;
                 assert!(
                     minimum <= bound,
@@ -77,7 +72,7 @@ fn no_duration_is_longer_than_the_verified_one() {
                 );
             }
             if let Some(best) = joint.best
-                && !(loose && best < short)
+                && !(loose && best < 2e-3)
             {
                 assert!(
                     minimum <= best * (1.0 + 1e-6),
@@ -90,9 +85,10 @@ fn no_duration_is_longer_than_the_verified_one() {
     }
 }
 
-/// End state and limits by exact integration of the segments. Both are relative to the sizes that
-/// occur on the way: a trajectory of 1000 s at 10 rad/s cannot end more exactly than its largest
-/// position is known.
+/// End state and limits by exact integration of the segments. The errors of the end state are
+/// relative to what roundings of the switching times do: such a time is known to 2e-16 of the
+/// duration, which the jerk turns into an acceleration, and that, over the duration, into a
+/// velocity and a position.
 #[test]
 fn every_trajectory_is_valid_by_exact_integration() {
     let mut worst = Faults::default();
@@ -109,19 +105,26 @@ fn every_trajectory_is_valid_by_exact_integration() {
                 position,
                 &joint.limits,
             );
-            let size = profile.segments().fold([1.0_f64; 3], |size, segment| {
-                let start = segment.start;
-                [
-                    size[0].max(start.position.abs()),
-                    size[1].max(start.velocity.abs()),
-                    size[2].max(start.acceleration.abs()),
-                ]
+            let reach = profile.segments().fold(1.0_f64, |reach, segment| {
+                reach.max(segment.start.position.abs())
             });
+            let bounded = |limit: f64, start: f64| match limit.is_finite() {
+                true => limit.max(start.abs()).max(1.0),
+                false => start.abs().max(1.0),
+            };
+            let limits = &joint.limits;
+            let jerk = if limits.jerk_max.is_finite() {
+                limits.jerk_max
+            } else {
+                0.0
+            };
+            let push = bounded(limits.acceleration_max, joint.start.acceleration) + duration * jerk;
+            let speed = bounded(limits.velocity_max, joint.start.velocity) + duration * push;
             let relative = Faults {
-                position: faults.position / (size[0] + duration * size[1]),
-                velocity: faults.velocity / (size[1] + duration * size[2]),
-                acceleration: faults.acceleration / size[2],
-                drift: faults.drift / (size[0] + duration * size[1]),
+                position: faults.position / (reach + duration * speed),
+                velocity: faults.velocity / speed,
+                acceleration: faults.acceleration / push,
+                drift: faults.drift / (reach + duration * speed),
                 ..faults
             };
             let name = || {
@@ -131,15 +134,24 @@ fn every_trajectory_is_valid_by_exact_integration() {
                 )
             };
             assert!(
-                relative.position <= 1e-12 && relative.drift <= 1e-12,
-                "{}",
+                relative.position <= 1e-14 && relative.drift <= 1e-14,
+                "{relative:?} {}",
                 name()
             );
             assert!(
-                relative.velocity <= 1e-12 && relative.acceleration <= 1e-12,
-                "{}",
+                relative.velocity <= 1e-14 && relative.acceleration <= 1e-14,
+                "{relative:?} {}",
                 name()
             );
+            if case.tag != "huge" && duration < 50.0 {
+                assert!(
+                    faults.position <= 1e-9
+                        && faults.velocity <= 1e-11
+                        && faults.acceleration <= 1e-11,
+                    "{}",
+                    name()
+                );
+            }
             assert!(faults.excess <= 1e-11 && faults.jerk <= 1e-12, "{}", name());
             if position {
                 let end = profile.at(profile.duration());

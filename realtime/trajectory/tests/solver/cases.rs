@@ -5,34 +5,34 @@ use tandem_trajectory::{Input, Interface, Limits, State, Synchronization};
 
 /// One problem and what is known about it.
 #[derive(Clone, Debug, Default)]
-pub struct Case {
-    pub id: usize,
-    pub tag: String,
-    pub interface: Interface,
-    pub synchronization: Synchronization,
-    pub step: f64,
-    pub minimum: f64,
+pub(crate) struct Case {
+    pub(crate) id: usize,
+    pub(crate) tag: String,
+    pub(crate) interface: Interface,
+    pub(crate) synchronization: Synchronization,
+    pub(crate) step: f64,
+    pub(crate) minimum: f64,
     /// ruckig's result code.
-    pub code: i32,
+    pub(crate) code: i32,
     /// Its duration, and whether an independent check in extended precision confirmed it.
-    pub duration: f64,
-    pub verified: bool,
-    pub straight: bool,
-    pub joints: Vec<JointCase>,
+    pub(crate) duration: f64,
+    pub(crate) verified: bool,
+    pub(crate) straight: bool,
+    pub(crate) joints: Vec<JointCase>,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct JointCase {
-    pub start: State,
-    pub target: State,
-    pub limits: Limits,
-    pub minimum: f64,
+pub(crate) struct JointCase {
+    pub(crate) start: State,
+    pub(crate) target: State,
+    pub(crate) limits: Limits,
+    pub(crate) minimum: f64,
     /// A shorter minimum that a symmetry proves.
-    pub best: Option<f64>,
+    pub(crate) best: Option<f64>,
 }
 
 impl Case {
-    pub fn input<const N: usize>(&self) -> Input<N> {
+    pub(crate) fn input<const N: usize>(&self) -> Input<N> {
         let mut input = Input {
             minimum_duration: self.minimum,
             duration_step: self.step,
@@ -49,7 +49,7 @@ impl Case {
     }
 }
 
-pub fn load() -> Vec<Case> {
+pub(crate) fn load() -> Vec<Case> {
     let mut cases: Vec<Case> = Vec::new();
     let mut lines = include_str!("cases.csv").lines();
     let columns: Vec<&str> = lines.next().expect("a header").split(',').collect();

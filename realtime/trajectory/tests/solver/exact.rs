@@ -2,7 +2,7 @@
 
 /// An unevaluated sum of two doubles.
 #[derive(Clone, Copy, Debug)]
-pub struct Exact(pub f64, pub f64);
+pub(crate) struct Exact(pub(crate) f64, pub(crate) f64);
 
 fn sum(a: f64, b: f64) -> Exact {
     let s = a + b;
