@@ -14,16 +14,22 @@ pub(super) struct DoctorArgs {
 }
 
 pub(super) fn doctor(args: &DoctorArgs) -> u8 {
-    let checks = doctor::examine();
+    let checks = doctor::examine(&std::env::temp_dir());
     for check in &checks {
         if args.json {
             let mut line = serde_json::to_value(check).unwrap_or_default();
             line["event"] = json!("check");
             anstream::println!("{line}");
         } else {
-            anstream::println!("{:9} {:22} {}", check.verdict.name(), check.name, check.found);
-            if check.verdict != Verdict::Ok {
-                anstream::println!("{:9} {:22} -> {}", "", "", check.fix);
+            let word = match check.verdict {
+                Verdict::Ok => "ok",
+                Verdict::Degraded => "degraded",
+                Verdict::Failed => "FAILED",
+            };
+            anstream::println!("{word:9} {:18} {}", check.name, check.found);
+            if let Some(fix) = &check.fix {
+                anstream::println!("{:28} {}", "", check.matters);
+                anstream::println!("{:28} -> {fix}", "");
             }
         }
     }

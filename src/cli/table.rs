@@ -31,7 +31,7 @@ fn fields(step: &JournalEntry) -> [String; 14] {
 /// The steps for the screen.
 pub(super) fn steps(steps: &[JournalEntry]) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(COLUMNS);
+    table.load_style(presets::NOTHING).set_header(COLUMNS);
     for step in steps {
         table.add_row(fields(step).map(|field| {
             let numeric = field.parse::<f64>().is_ok();

@@ -145,6 +145,6 @@ fn fault(loss: Loss) -> RoleFault {
         Loss::Killed { .. } => RoleFault::Killed,
         Loss::Exited { .. } => RoleFault::Exited,
         Loss::Silent => RoleFault::Silent,
-        Loss::NeverReady => RoleFault::Unresponsive,
+        Loss::NeverReady => RoleFault::Unstartable,
     }
 }

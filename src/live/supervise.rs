@@ -14,7 +14,7 @@ use super::rollcall::RollCall;
 use super::warden::{Orders, Report};
 use super::{LiveError, shell, signals};
 use crate::roles::{SupervisorRole, Surroundings, service};
-use crate::supervisor::{Event, Outcome, Supervisor};
+use crate::supervisor::{Event, Outcome, Summary, Supervisor};
 
 /// A measured state older than this does not say that the arm stands.
 const FRESH: Duration = Duration::from_millis(250);
@@ -32,6 +32,8 @@ const STANDSTILL: f64 = 0.01;
 pub struct Ended {
     /// What became of it.
     pub outcome: Outcome,
+    /// Its numbers.
+    pub summary: Summary,
     /// Time on the cell's clock since the loop began, seconds.
     pub time_s: f64,
     /// Health of each loop at the end, by role code.
@@ -107,7 +109,8 @@ impl Watch<'_> {
             {
                 let loops = roles.loops(shell::stats(Role::Supervisor, &rate, &granted));
                 let time_s = now.as_secs_f64() - start.as_secs_f64();
-                return Ok(Ended { outcome: end.outcome.clone(), time_s, loops, restarts: roles.restarts() });
+                let summary = role.summary();
+                return Ok(Ended { outcome: end.outcome.clone(), summary, time_s, loops, restarts: roles.restarts() });
             }
         }
     }

@@ -10,6 +10,7 @@
 //! **Invariant:** the same cloud gives the same feature, bit for bit, on one machine.
 
 pub mod card;
+mod columns;
 pub mod fit;
 mod grid;
 pub mod model;

@@ -34,16 +34,13 @@ mod drive;
 mod dynamics;
 mod effector;
 mod eye;
-mod figure;
 mod frames;
-mod glide;
 mod human;
 mod model;
 mod parts;
 mod referee;
 pub mod solid;
 mod station;
-mod tracker;
 
 #[cfg(test)]
 mod tests;
@@ -52,12 +49,11 @@ use arm::{Arm, GRAVITY};
 use drive::Drive;
 use effector::{Effector, Reach};
 use eye::Eye;
-use human::{Person, Sight};
+use human::{Person, Sight, Tracker};
 use model::PlantModel;
 use parts::Parts;
 use referee::{Look, Referee};
 use station::Feeder;
-use tracker::Tracker;
 
 /// What the plant hears in a cycle: the latest of each.
 pub struct PlantInputs<'a> {
@@ -114,19 +110,15 @@ fn stream(seed: u64, organ: u64) -> ChaCha8Rng {
 /// Why a plant cannot be built.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlantError {
-    /// The arm at rest stands in its own way or outside its limits.
-    #[error("{robot}: joint {joint} rests at {position} rad, allowed {min}..={max} rad; correct the resting position")]
-    HomeOutsideLimits {
+    /// Joints and masses do not match.
+    #[error("arm {robot}: {joints} joints need masses of {} links, found {links}; correct the robot's file", joints + 1)]
+    LinkCount {
         /// Name of the arm.
         robot: String,
-        /// Joint, counted from 0.
-        joint: usize,
-        /// Where it rests, rad.
-        position: f64,
-        /// Lower limit, rad.
-        min: f64,
-        /// Upper limit, rad.
-        max: f64,
+        /// Moving joints.
+        joints: usize,
+        /// Links with a mass, the base included.
+        links: usize,
     },
 }
 
@@ -134,10 +126,9 @@ impl Plant {
     /// The hardware of a cell, standing still: arm at rest, tools in the rack, parts in the feeder.
     ///
     /// # Errors
-    /// An arm that cannot rest where its configuration says.
+    /// An arm whose joints and masses do not match.
     pub fn new(cell: &Cell, seed: u64) -> Result<Self, PlantError> {
-        let robot = model::robot(cell)?;
-        Ok(Self::of(PlantModel::of(cell, &robot), Eye::new(cell, stream(seed, 5)), seed))
+        Ok(Self::of(PlantModel::of(cell)?, Eye::new(cell, stream(seed, 5)), seed))
     }
 
     fn of(model: PlantModel, eye: Eye, seed: u64) -> Self {

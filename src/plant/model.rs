@@ -2,16 +2,18 @@
 
 use core::time::Duration;
 
-use nalgebra::{Isometry3, Vector3};
-use tandem_config::{Body, Cell, FixedObject, Part};
-use tandem_kinematics::{Chain, JointKind};
-use tandem_msg::{Coded, EffectorAction, FeatureClass, JOINTS_MAX, Tool};
+use nalgebra::{Isometry3, Matrix3, Vector3};
+use tandem_clearance::LinkCapsule;
+use tandem_config::{Body, Cell, FixedObject, Part, Robot};
+use tandem_kinematics::JointKind;
+use tandem_msg::{Coded, EffectorAction, FeatureClass, Tool};
 
+use super::PlantError;
 use super::arm::{ArmModel, JointModel, LinkMass};
 use super::effector::{EffectorModel, GRIPPER_OPENING};
 use super::human::PersonModel;
 use super::parts::{Block, PartModel};
-use super::referee::{ArmCapsule, Kind, Obstacle};
+use super::referee::{Kind, Obstacle};
 use super::station::FeederModel;
 
 /// Farthest from the rack pose a tool still couples: metres, radians.
@@ -25,7 +27,7 @@ const CUP_LOAD: f64 = 6.0;
 /// Everything the plant is made of, in its own terms.
 pub(crate) struct PlantModel {
     pub(super) arm: ArmModel,
-    pub(super) capsules: Vec<ArmCapsule>,
+    pub(super) capsules: Vec<LinkCapsule>,
     pub(super) obstacles: Vec<Obstacle>,
     pub(super) effector: EffectorModel,
     pub(super) parts: Vec<PartModel>,
@@ -38,20 +40,14 @@ pub(crate) struct PlantModel {
     pub(super) config_hash: u64,
 }
 
-/// The arm of a cell: chain, mass of each moving link, capsules around them, joints at rest.
-pub(super) struct Robot {
-    pub(super) chain: Chain,
-    pub(super) links: Vec<LinkMass>,
-    pub(super) capsules: Vec<ArmCapsule>,
-    pub(super) home: [f64; JOINTS_MAX],
-}
-
 impl PlantModel {
-    pub(super) fn of(cell: &Cell, robot: &Robot) -> Self {
+    /// # Errors
+    /// An arm whose joints and masses do not match.
+    pub(super) fn of(cell: &Cell) -> Result<Self, PlantError> {
         let base_from_fixture = cell.layout.base_from_fixture;
-        Self {
-            arm: arm(robot),
-            capsules: robot.capsules.clone(),
+        Ok(Self {
+            arm: arm(&cell.robot)?,
+            capsules: cell.robot.body.capsules().to_vec(),
             obstacles: obstacles(cell),
             effector: effector(cell),
             parts: cell.product.parts.iter().map(|part| part_model(part, &base_from_fixture)).collect(),
@@ -68,12 +64,17 @@ impl PlantModel {
             tracking_sigma: cell.human.tracking_sigma,
             period: cell.timing.plant.period,
             config_hash: cell.hash,
-        }
+        })
     }
 }
 
-fn arm(robot: &Robot) -> ArmModel {
-    let joints = robot.chain.joints().iter().zip(&robot.links).map(|(joint, link)| JointModel {
+fn arm(robot: &Robot) -> Result<ArmModel, PlantError> {
+    // The first link is the base, which does not move.
+    let (joints, links) = (robot.chain.joint_count(), robot.links.len());
+    if links != joints + 1 {
+        return Err(PlantError::LinkCount { robot: robot.name.clone(), joints, links });
+    }
+    let joints = robot.chain.joints().iter().zip(&robot.links[1..]).map(|(joint, link)| JointModel {
         parent_from_joint: joint.parent_from_joint,
         axis: joint.axis,
         prismatic: joint.kind == JointKind::Prismatic,
@@ -81,9 +82,13 @@ fn arm(robot: &Robot) -> ArmModel {
         velocity_max: joint.velocity_max,
         acceleration_max: joint.acceleration_max,
         effort_max: joint.effort_max,
-        link: *link,
+        link: LinkMass {
+            mass: link.mass,
+            centre: Vector3::from(link.centre),
+            inertia: Matrix3::from_fn(|row, column| link.inertia[row][column]),
+        },
     });
-    ArmModel { joints: joints.collect(), flange_from_tcp: *robot.chain.tool(), home: robot.home }
+    Ok(ArmModel { joints: joints.collect(), flange_from_tcp: *robot.chain.tool(), home: robot.home })
 }
 
 fn obstacles(cell: &Cell) -> Vec<Obstacle> {
@@ -216,52 +221,4 @@ fn person(cell: &Cell) -> PersonModel {
         intrusion_probability: human.intrusion_probability,
         decline_probability: human.decline_probability,
     }
-}
-
-/// The arm of a cell.
-pub(super) fn robot(_cell: &Cell) -> Result<Robot, super::PlantError> {
-    use nalgebra::{Matrix3, Translation3, UnitQuaternion};
-    use tandem_kinematics::Joint;
-    let half = core::f64::consts::FRAC_PI_2;
-    let rows = [
-        ([0.0, 0.0, 0.1273], 0.0, Vector3::z_axis(), 7.778, [0.0, 0.0, 0.0]),
-        ([0.0, 0.220941, 0.0], half, Vector3::y_axis(), 12.93, [0.0, 0.0, 0.306]),
-        ([0.0, -0.1719, 0.612], 0.0, Vector3::y_axis(), 3.87, [0.0, 0.0, 0.28615]),
-        ([0.0, 0.0, 0.5723], half, Vector3::y_axis(), 1.96, [0.0, 0.0, 0.0]),
-        ([0.0, 0.1149, 0.0], 0.0, Vector3::z_axis(), 1.96, [0.0, 0.0, 0.0]),
-        ([0.0, 0.0, 0.1157], 0.0, Vector3::y_axis(), 0.202, [0.0, 0.0, 0.0]),
-    ];
-    let mut joints = Vec::new();
-    let mut links = Vec::new();
-    for (xyz, pitch, axis, mass, centre) in rows {
-        joints.push(Joint {
-            kind: JointKind::Revolute,
-            parent_from_joint: Isometry3::from_parts(
-                Translation3::from(Vector3::from(xyz)),
-                UnitQuaternion::from_axis_angle(&Vector3::y_axis(), pitch),
-            ),
-            axis,
-            position_min: -6.2,
-            position_max: 6.2,
-            velocity_max: 2.16,
-            acceleration_max: 8.0,
-            jerk_max: 80.0,
-            effort_max: 330.0,
-        });
-        links.push(LinkMass { mass, centre: Vector3::from(centre), inertia: Matrix3::identity() * (0.01 * mass) });
-    }
-    let tool =
-        Isometry3::from_parts(Translation3::new(0.0, 0.0922, 0.0), UnitQuaternion::from_euler_angles(-half, 0.0, 0.0))
-            * Translation3::new(0.0, 0.0, 0.2);
-    let chain = Chain::new(&joints, tool).expect("stand-in");
-    let c = |link, a: [f64; 3], b: [f64; 3], radius| ArmCapsule { link, ends: [a.into(), b.into()], radius };
-    let capsules = vec![
-        c(2, [0.0, 0.0, 0.0], [0.0, 0.0, 0.612], 0.08),
-        c(3, [0.0, 0.0, 0.0], [0.0, 0.0, 0.5723], 0.065),
-        c(4, [0.0, 0.0, 0.0], [0.0, 0.1149, 0.0], 0.05),
-        c(5, [0.0, 0.0, 0.0], [0.0, 0.0, 0.1157], 0.05),
-        c(6, [0.0, 0.05, 0.0], [0.0, 0.24, 0.0], 0.04),
-    ];
-    let home = [0.0, -half, half, -half, -half, 0.0, 0.0, 0.0];
-    Ok(Robot { chain, links, capsules, home })
 }

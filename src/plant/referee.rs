@@ -18,10 +18,11 @@ use nalgebra::{Isometry3, Vector3};
 use rapier3d_f64::math::Pose as BodyPose;
 use rapier3d_f64::parry::query::intersection_test;
 use rapier3d_f64::parry::shape::{Capsule, Cuboid, Shape};
+use tandem_clearance::LinkCapsule;
 use tandem_msg::Stamp;
 
-use super::figure::{CAPSULES, Limb};
 use super::frames::{apart, body_pose, vector};
+use super::human::{CAPSULES, Limb};
 use super::parts::{Block, Parts, Place};
 
 /// Time between two looks.
@@ -56,14 +57,6 @@ pub(super) struct Obstacle {
     pub(super) base_from_object: Isometry3<f64>,
 }
 
-/// A capsule on a link, metres, in the link's frame.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct ArmCapsule {
-    pub(super) link: usize,
-    pub(super) ends: [Vector3<f64>; 2],
-    pub(super) radius: f64,
-}
-
 /// What is looked at.
 pub(super) struct Look<'a> {
     pub(super) base_from_link: &'a [Isometry3<f64>],
@@ -82,6 +75,16 @@ struct Piece<S> {
     reach: f64,
 }
 
+/// A capsule of the arm with the middle of its segment and the radius of the sphere
+/// around it, in the frame of its link.
+struct Link {
+    link: usize,
+    tool: bool,
+    shape: Capsule,
+    centre: Vector3<f64>,
+    reach: f64,
+}
+
 struct Solid {
     kind: Kind,
     piece: Piece<Cuboid>,
@@ -89,7 +92,7 @@ struct Solid {
 
 /// The referee and the count.
 pub(super) struct Referee {
-    links: Vec<(usize, Capsule, Vector3<f64>, f64)>,
+    links: Vec<Link>,
     fixed: Vec<Solid>,
     touching: Vec<bool>,
     contacts: u32,
@@ -109,14 +112,19 @@ enum Mover {
 
 impl Referee {
     /// A referee who has seen nothing yet. The base link stands on the bench and is not looked at.
-    pub(super) fn new(arm: &[ArmCapsule], fixed: &[Obstacle], parts: usize) -> Self {
+    pub(super) fn new(arm: &[LinkCapsule], fixed: &[Obstacle], parts: usize) -> Self {
         let links = arm
             .iter()
             .filter(|capsule| capsule.link > 0)
             .map(|capsule| {
-                let [a, b] = capsule.ends;
-                let shape = Capsule::new(vector(&a), vector(&b), (capsule.radius - DEPTH).max(1e-4));
-                (capsule.link, shape, (a + b) / 2.0, (a - b).norm() / 2.0 + capsule.radius)
+                let [a, b] = capsule.ends.map(Vector3::from);
+                Link {
+                    link: capsule.link,
+                    tool: capsule.tool,
+                    shape: Capsule::new(vector(&a), vector(&b), (capsule.radius - DEPTH).max(1e-4)),
+                    centre: (a + b) / 2.0,
+                    reach: (a - b).norm() / 2.0 + capsule.radius,
+                }
             })
             .collect();
         let fixed: Vec<Solid> = fixed
@@ -161,7 +169,6 @@ impl Referee {
     /// What is being touched: fixed objects, then parts, then the person.
     fn see(&self, now: Stamp, look: &Look<'_>, parts: &Parts) -> Vec<bool> {
         let mut seen = vec![false; self.touching.len()];
-        let last = look.base_from_link.len() - 1;
         let leaving = self.let_go.is_some_and(|at| at.age_at(now) < LEAVING);
         let seating = leaving || self.held.is_some_and(|part| near_home(parts, part));
         let taking = (look.base_from_tcp.translation.vector - self.taken_at).norm() < NEAR;
@@ -173,15 +180,15 @@ impl Referee {
             (Mover::Part, Kind::Rack) => false,
             (_, Kind::Table) => seating,
         };
-        for (link, shape, centre, reach) in &self.links {
-            let Some(frame) = look.base_from_link.get(*link) else { continue };
+        for link in &self.links {
+            let Some(frame) = look.base_from_link.get(link.link) else { continue };
             let piece = Piece {
-                shape: *shape,
+                shape: link.shape,
                 pose: body_pose(frame),
-                centre: frame.transform_point(&(*centre).into()).coords,
-                reach: *reach,
+                centre: frame.transform_point(&link.centre.into()).coords,
+                reach: link.reach,
             };
-            let mover = if *link == last { Mover::Tool } else { Mover::Link };
+            let mover = if link.tool { Mover::Tool } else { Mover::Link };
             self.meet(&piece, mover, &allowed, look, parts, seating, &mut seen);
         }
         if let Some(part) = self.held {

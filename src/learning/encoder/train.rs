@@ -20,7 +20,9 @@ use crate::perception::network::{ARCHITECTURE, Input, Network};
 use crate::perception::{CARD_FILE, Sampler, WEIGHTS_FILE};
 
 /// Examples of one step.
-const BATCH: usize = 32;
+const BATCH: usize = 16;
+/// Every so many points of a cloud are segmented in training; all are in use.
+pub(crate) const SEGMENT_STRIDE: usize = 2;
 /// Largest learning rate of the one-cycle schedule.
 const RATE: f32 = 3e-3;
 /// Share of the run in which the rate rises.
@@ -230,7 +232,7 @@ impl Run {
         for (step, batch) in order.chunks_exact(BATCH).enumerate() {
             let examples: Vec<Example> = batch.iter().map(|&i| augmented(&training[i], &mut rng)).collect();
             let samples: Vec<_> = examples.iter().map(|e| &e.sample).collect();
-            let input = Input::of(&samples, &Device::Cpu)?;
+            let input = Input::of(&samples, SEGMENT_STRIDE, &Device::Cpu)?;
             let mask = dropout_mask(BATCH, self.network.dropout_width(), &mut rng)?;
             let output = self.network.forward(&input, Some(&mask))?;
             let loss = loss(&output, &examples)?;

@@ -11,25 +11,28 @@
 
 use std::collections::VecDeque;
 
-use nalgebra::{UnitQuaternion, Vector3};
+use nalgebra::Vector3;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rapier3d_f64::prelude::PhysicsWorld;
 use tandem_msg::{Answer, FeatureClass, OperatorEvent, Prompt, PromptKind, Stamp};
 
-use super::figure::{CAPSULES, HAND_RADIUS, Limb, figure, hands_at_rest};
-use super::glide::Glide;
 use super::parts::{Parts, Place};
 
-/// How fast a person gets going, m/s².
-const WALK_ACCELERATION: f64 = 1.5;
-/// How fast a hand gets going, m/s².
-const HAND_ACCELERATION: f64 = 5.0;
-/// From the stand, farther than this on the level is out of reach, metres.
-const REACH_LEVEL: f64 = 0.88;
-/// Between bench edge and someone standing at it, metres.
-const BENCH_GAP: f64 = 0.2;
+mod figure;
+mod glide;
+mod movement;
+mod script;
+mod tracker;
+
+use figure::{figure, hands_at_rest};
+use glide::Glide;
+use script::{Deed, Hands, Task};
+
+pub(super) use figure::{CAPSULES, Limb};
+pub(super) use tracker::Tracker;
+
 /// A tool that has stood this long is standing, seconds.
 const STILL_FOR: f64 = 0.3;
 /// Longest wait for a moving tool, and longest try to reach something, seconds.
@@ -60,46 +63,6 @@ pub(super) struct PersonModel {
     pub(super) intrusion_probability: f64,
     /// Chance of declining to assemble.
     pub(super) decline_probability: f64,
-}
-
-/// Where the hands go.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Hands {
-    /// At the sides of the trunk.
-    Rest,
-    /// In front of the chest.
-    Chest,
-    /// On the near side of a part, wherever it is.
-    Part(usize),
-    /// On the near side of where a part belongs.
-    Home(usize),
-    /// At a point of the cell.
-    Point(Vector3<f64>),
-}
-
-/// One thing to do; the next begins when it is done.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Deed {
-    Wait(f64),
-    /// As `Wait`, hands busy.
-    Work(f64),
-    Walk(Vector3<f64>),
-    Reach(Hands),
-    /// Walk to where the part, or its home, is within reach.
-    Approach(Hands),
-    AwaitStillTool,
-    /// Pick a part up; from the tool too when `force` says so.
-    Take {
-        part: usize,
-        force: bool,
-    },
-    /// Get hold of a part in the tool.
-    HoldOn(usize),
-    AwaitRelease(usize),
-    LetGo,
-    Seat(usize),
-    Secure(usize),
-    Say(Answer),
 }
 
 enum Progress {
@@ -217,97 +180,24 @@ impl Person {
 
     /// What the prompt asks, as deeds. A prompt replaces what was under way.
     fn take_up(&mut self, parts: &Parts) {
-        let part = self.prompt.part_index as usize;
-        let reaction = self.about(self.model.reaction);
-        let work = self.about(self.model.assemble);
-        let look = self.about(self.model.inspect);
-        let unwilling = self.random.random::<f64>() < self.model.decline_probability;
         let asked = Vector3::from(self.prompt.base_from_part.position);
         let said = self.prompt.base_from_part.is_valid() && asked.norm() > 0.1;
-        let meeting = Hands::Point(if said { asked } else { self.model.focus });
+        let task = Task {
+            part: self.prompt.part_index as usize,
+            meeting: Hands::Point(if said { asked } else { self.model.focus }),
+            rest: self.model.rest,
+            reaction: self.about(self.model.reaction),
+            work: self.about(self.model.assemble),
+            look: self.about(self.model.inspect),
+            willing: self.random.random::<f64>() >= self.model.decline_probability,
+        };
         self.deeds.clear();
         self.path.clear();
         self.began = None;
         self.hand_on = None;
-        let kind = self.prompt.kind.get().unwrap_or(PromptKind::None);
-        let known = part < parts.count();
-        let script: &[Deed] = match kind {
-            PromptKind::None => &[],
-            PromptKind::Identify => &[Deed::Wait(reaction + look), Deed::Say(Answer::Done)],
-            PromptKind::Inspect => {
-                &[Deed::Wait(reaction), Deed::Say(Answer::Started), Deed::Wait(look), Deed::Say(Answer::Done)]
-            }
-            _ if !known => &[Deed::Wait(reaction), Deed::Say(Answer::Declined)],
-            PromptKind::Assemble | PromptKind::Receive | PromptKind::AssembleHeld if unwilling => {
-                &[Deed::Wait(reaction), Deed::Say(Answer::Declined)]
-            }
-            PromptKind::Assemble => &[
-                Deed::Wait(reaction),
-                Deed::Say(Answer::Started),
-                Deed::Approach(Hands::Part(part)),
-                Deed::Reach(Hands::Part(part)),
-                Deed::Take { part, force: false },
-                Deed::Reach(Hands::Chest),
-                Deed::Approach(Hands::Home(part)),
-                Deed::Reach(Hands::Home(part)),
-                Deed::Work(work),
-                Deed::Seat(part),
-                Deed::Reach(Hands::Rest),
-                Deed::Walk(self.model.rest),
-                Deed::Say(Answer::Done),
-            ],
-            PromptKind::Receive => &[
-                Deed::Wait(reaction),
-                Deed::Say(Answer::Started),
-                Deed::Approach(meeting),
-                Deed::AwaitStillTool,
-                Deed::Reach(Hands::Part(part)),
-                Deed::HoldOn(part),
-                Deed::Say(Answer::Holding),
-                Deed::AwaitRelease(part),
-                Deed::Reach(Hands::Chest),
-                Deed::LetGo,
-                Deed::Approach(Hands::Home(part)),
-                Deed::Reach(Hands::Home(part)),
-                Deed::Work(work),
-                Deed::Seat(part),
-                Deed::Reach(Hands::Rest),
-                Deed::Walk(self.model.rest),
-                Deed::Say(Answer::Done),
-            ],
-            PromptKind::AssembleHeld => &[
-                Deed::Wait(reaction),
-                Deed::Say(Answer::Started),
-                Deed::Approach(meeting),
-                Deed::AwaitStillTool,
-                Deed::Reach(Hands::Part(part)),
-                Deed::HoldOn(part),
-                Deed::Work(work),
-                Deed::Secure(part),
-                Deed::LetGo,
-                Deed::Reach(Hands::Rest),
-                Deed::Walk(self.model.rest),
-                Deed::Say(Answer::Done),
-            ],
-            PromptKind::TakeOver => &[
-                Deed::Wait(reaction),
-                Deed::Say(Answer::Started),
-                Deed::Approach(Hands::Part(part)),
-                Deed::AwaitStillTool,
-                Deed::Reach(Hands::Part(part)),
-                Deed::Take { part, force: true },
-                Deed::Reach(Hands::Chest),
-                Deed::Approach(Hands::Home(part)),
-                Deed::Reach(Hands::Home(part)),
-                Deed::Work(work),
-                Deed::Seat(part),
-                Deed::Reach(Hands::Rest),
-                Deed::Walk(self.model.rest),
-                Deed::Say(Answer::Done),
-            ],
-        };
         self.step_clear();
-        self.deeds.extend(script);
+        let kind = self.prompt.kind.get().unwrap_or(PromptKind::None);
+        self.deeds.extend(task.script(kind, task.part < parts.count()));
     }
 
     /// Someone interrupted inside the cell draws their hands back first.
@@ -460,117 +350,5 @@ impl Person {
             class: class.into(),
             reserved: 0,
         };
-    }
-
-    /// A ground point from which `there` can be reached: the work stand, or beside the bench.
-    fn stand_for(&self, there: &Vector3<f64>) -> Vector3<f64> {
-        let level = |a: &Vector3<f64>| (a - there).xy().norm();
-        if level(&self.model.work) <= REACH_LEVEL {
-            return self.model.work;
-        }
-        let [[x_min, x_max], [y_min, y_max]] = self.model.bench;
-        let y = if there.y < (y_min + y_max) / 2.0 { y_min - BENCH_GAP } else { y_max + BENCH_GAP };
-        Vector3::new(there.x.clamp(x_min, x_max), y, self.model.work.z)
-    }
-
-    /// Sets out for a ground point, round the bench's front corners where it stands in the way.
-    fn set_out(&mut self, to: Vector3<f64>) {
-        let [[_, x_max], [y_min, y_max]] = self.model.bench;
-        let from = self.stand.position;
-        let beside = |p: &Vector3<f64>| p.x < x_max + BENCH_GAP / 2.0;
-        let corner = |p: &Vector3<f64>| {
-            let y = if p.y < (y_min + y_max) / 2.0 { y_min - BENCH_GAP } else { y_max + BENCH_GAP };
-            Vector3::new(x_max + BENCH_GAP, y, p.z)
-        };
-        self.path.clear();
-        let same_side = beside(&from) && beside(&to) && corner(&from) == corner(&to);
-        if beside(&from) && !same_side {
-            self.path.push_back(corner(&from));
-        }
-        if beside(&to) && !same_side {
-            self.path.push_back(corner(&to));
-        }
-        self.path.push_back(to);
-    }
-
-    fn point_of(&self, hands: Hands, parts: &Parts) -> Vector3<f64> {
-        match hands {
-            Hands::Part(part) => parts.base_from_part(part).translation.vector,
-            Hands::Home(part) => {
-                parts.model(part).map_or(self.model.focus, |model| model.base_from_place.translation.vector)
-            }
-            Hands::Point(point) => point,
-            Hands::Rest | Hands::Chest => self.stand.position,
-        }
-    }
-
-    fn heading(&self) -> f64 {
-        let ahead = self.model.focus - self.stand.position;
-        ahead.y.atan2(ahead.x)
-    }
-
-    /// Goals of both hands in the frame of the stand.
-    fn hand_goals(&self, parts: &Parts) -> [Vector3<f64>; 2] {
-        let chest = [Vector3::new(0.35, 0.10, 1.10), Vector3::new(0.35, -0.10, 1.10)];
-        let (pose, half) = match self.goal {
-            Hands::Rest => return hands_at_rest(),
-            Hands::Chest => return chest,
-            Hands::Part(part) => {
-                // A part in these very hands cannot be reached for.
-                if parts.place(part) == Place::Person {
-                    return chest;
-                }
-                (parts.base_from_part(part), parts.model(part).map_or([0.05; 3], |model| model.half_extents))
-            }
-            Hands::Home(part) => match parts.model(part) {
-                Some(model) => (model.base_from_place, model.half_extents),
-                None => return chest,
-            },
-            Hands::Point(point) => (nalgebra::Isometry3::translation(point.x, point.y, point.z), [0.0; 3]),
-        };
-        let centre = pose.translation.vector;
-        let level = |v: Vector3<f64>| Vector3::new(v.x, v.y, 0.0).try_normalize(1e-6).unwrap_or_else(Vector3::x);
-        let near = level(self.stand.position - centre);
-        let aside = Vector3::z().cross(&near);
-        let extent = |along: &Vector3<f64>| -> f64 {
-            let own = pose.rotation.inverse() * along;
-            own.x.abs() * half[0] + own.y.abs() * half[1] + own.z.abs() * half[2]
-        };
-        let touch = centre + near * (extent(&near) + HAND_RADIUS);
-        let spread = extent(&aside).clamp(HAND_RADIUS, 0.12);
-        // Facing the part, the left hand lies on the far side of `aside`.
-        let back = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -self.heading());
-        [-1.0, 1.0].map(|side| back * (touch + aside * (side * spread) - self.stand.position))
-    }
-
-    fn hands_there(&self, parts: &Parts) -> bool {
-        let goals = self.hand_goals(parts);
-        self.hands.iter().zip(&goals).all(|(hand, goal)| (hand.position - goal).norm() < 0.01)
-    }
-
-    fn move_body(&mut self, now: Stamp, dt: f64, parts: &Parts) {
-        if let Some(&to) = self.path.front() {
-            if self.stand.step(&to, self.model.walk_speed, WALK_ACCELERATION, dt) {
-                self.path.pop_front();
-            }
-        } else {
-            let here = self.stand.position;
-            self.stand.step(&here, self.model.walk_speed, WALK_ACCELERATION, dt);
-        }
-        let goals = self.hand_goals(parts);
-        let busy = matches!(self.deeds.front(), Some(Deed::Work(_)));
-        let turn = now.as_secs_f64() * core::f64::consts::TAU;
-        let stir = if busy { Vector3::new(0.0, 0.02 * turn.sin(), 0.02 * turn.cos()) } else { Vector3::zeros() };
-        for (hand, goal) in self.hands.iter_mut().zip(&goals) {
-            hand.step(&(goal + stir), self.model.hand_speed, HAND_ACCELERATION, dt);
-        }
-        let hands = [self.hands[0].position, self.hands[1].position];
-        let body = figure(&self.stand.position, self.heading(), &hands);
-        for ((velocity, before), after) in self.velocity.iter_mut().zip(&self.body).zip(&body) {
-            // A capsule's ends differ in speed; the separation is owed to the faster.
-            let ends = [0, 1].map(|end| (after.ends[end] - before.ends[end]) / dt);
-            *velocity = if ends[0].norm_squared() > ends[1].norm_squared() { ends[0] } else { ends[1] };
-        }
-        self.body = body;
     }
 }

@@ -27,7 +27,7 @@ const REACH: f64 = UPPER_ARM + FOREARM + HAND - 0.02;
 const LEAN_MAX: f64 = 0.75;
 
 /// Capsules of a figure.
-pub(super) const CAPSULES: usize = 10;
+pub(in crate::plant) const CAPSULES: usize = 10;
 /// What each capsule covers: trunk, head, then left and right arm, then the legs.
 pub(super) const BODY: [BodyPart; CAPSULES] = [
     BodyPart::Torso,
@@ -47,9 +47,9 @@ pub(super) const HAND_RADIUS: f64 = RADIUS[4];
 
 /// A capsule of the body, in the base frame, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Limb {
-    pub(super) ends: [Vector3<f64>; 2],
-    pub(super) radius: f64,
+pub(in crate::plant) struct Limb {
+    pub(in crate::plant) ends: [Vector3<f64>; 2],
+    pub(in crate::plant) radius: f64,
 }
 
 /// Where a person's hands rest, in the frame of their stand (x ahead, z up), left then right.

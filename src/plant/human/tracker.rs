@@ -17,7 +17,7 @@ const ERROR_LASTS: f64 = 0.2;
 const CUT: f64 = 3.0;
 
 /// Tracks the body: each capsule is seen shifted by an error that wanders slowly.
-pub(super) struct Tracker {
+pub(in crate::plant) struct Tracker {
     sigma: f64,
     random: ChaCha8Rng,
     error: [Vector3<f64>; CAPSULES],
@@ -26,12 +26,12 @@ pub(super) struct Tracker {
 
 impl Tracker {
     /// A tracker whose errors have the standard deviation `sigma` along each axis, metres.
-    pub(super) fn new(sigma: f64, random: ChaCha8Rng) -> Self {
+    pub(in crate::plant) fn new(sigma: f64, random: ChaCha8Rng) -> Self {
         Self { sigma, random, error: [Vector3::zeros(); CAPSULES], next_frame: Stamp(0) }
     }
 
     /// Writes what is seen of a body at `now`.
-    pub(super) fn track(
+    pub(in crate::plant) fn track(
         &mut self,
         now: Stamp,
         body: &[Limb; CAPSULES],
