@@ -14,7 +14,7 @@ pub(super) struct DoctorArgs {
 }
 
 pub(super) fn doctor(args: &DoctorArgs) -> u8 {
-    let checks = doctor::examine(&std::env::temp_dir());
+    let checks = doctor::examine();
     for check in &checks {
         if args.json {
             let mut line = serde_json::to_value(check).unwrap_or_default();

@@ -64,7 +64,12 @@ pub(super) fn flush(folder: &Path) -> Check {
             if time <= FLUSH_GOOD {
                 Check::ok(NAME, found, matters)
             } else {
-                Check::degraded(NAME, found, matters, "put the journal on a faster disk: `[store] url` in the cell file")
+                Check::degraded(
+                    NAME,
+                    found,
+                    matters,
+                    "put the journal on a faster disk: `[store] url` in the cell file",
+                )
             }
         }
         Err(error) => Check::failed(
