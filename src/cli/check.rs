@@ -84,7 +84,12 @@ fn examine(cell: &Cell, store: Option<&str>) -> Vec<Finding> {
         },
     ];
     let mut also = |subject, result: Result<String, String>| findings.push(Finding { subject, result });
-    also("model", Perception::load(&cell.perception.model).map(|_| cell.perception.model.display().to_string()).map_err(|e| e.to_string()));
+    also(
+        "model",
+        Perception::load(&cell.perception.model)
+            .map(|_| cell.perception.model.display().to_string())
+            .map_err(|e| e.to_string()),
+    );
     also("controller", build_controller(cell).map(|_| "parameters accepted".to_owned()).map_err(|e| e.to_string()));
     also("plant", Plant::new(cell, 0).map(|_| "simulation builds".to_owned()).map_err(|e| e.to_string()));
     also(

@@ -5,8 +5,20 @@ use comfy_table::{Cell, CellAlignment, Table, presets};
 use crate::strategy::JournalEntry;
 
 const COLUMNS: [&str; 14] = [
-    "serial", "step", "attempt", "part", "state", "time_s", "duration_s", "subject", "class", "confidence", "mode",
-    "tool", "form", "clearance_min_m",
+    "serial",
+    "step",
+    "attempt",
+    "part",
+    "state",
+    "time_s",
+    "duration_s",
+    "subject",
+    "class",
+    "confidence",
+    "mode",
+    "tool",
+    "form",
+    "clearance_min_m",
 ];
 
 fn fields(step: &JournalEntry) -> [String; 14] {
