@@ -7,12 +7,17 @@ use crate::layout::Layout;
 use crate::perception::Perception;
 use crate::plant::Plant;
 use crate::product::{self, Product};
-use crate::read::{Reading, Table};
+use crate::read::{Bound, Reading, Table, bound};
+use crate::robot::{Robot, RobotOptions};
 use crate::strategy::{self, ReferenceRow, StrategyRow};
 use crate::supervisor::Supervisor;
 use crate::timing::{Realtime, Timing};
 use std::path::{Component, Path, PathBuf};
 use tandem_controller::Params;
+
+const HOME: Bound = bound("home_rad", "rad", -6.2832, 6.2832);
+const ACCELERATION: Bound = bound("acceleration_max_rad_s2", "rad/s2", 0.1, 100.0);
+const JERK: Bound = bound("jerk_max_rad_s3", "rad/s3", 1.0, 10_000.0);
 
 /// Where the strategy library and the journal are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -32,8 +37,8 @@ pub struct Cell {
     pub file: PathBuf,
     /// Hash of all files read, blake3 cut to 64 bits: peers of another configuration are refused.
     pub hash: u64,
-    /// URDF of the arm.
-    pub robot_file: PathBuf,
+    /// The arm.
+    pub robot: Robot,
     /// Limits and margins of the controller, with this cell's hash, period and resting configuration.
     pub controller: Params,
     /// When each role runs.
@@ -74,6 +79,7 @@ impl Cell {
             Some(mut cell) if faults.is_empty() => {
                 cell.hash = hash;
                 cell.controller.config_hash = hash;
+                cell.controller.home = cell.robot.home;
                 Ok(cell)
             }
             _ => Err(Faults::new(faults)),
@@ -98,7 +104,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     let perception = Perception::read(&root, folder);
     let supervisor = Supervisor::read(&root);
     let store = read_store(&root);
-    let robot_file = root.text("robot").map(|file| beside(folder, &file));
+    let robot = read_robot(&root, folder, reading);
     let product = layout.as_ref().and_then(|layout| read_product(&root, product, folder, layout, reading));
     let (mut reference, mut strategies) = (Vec::new(), Vec::new());
     for file in root.texts("strategies") {
@@ -123,7 +129,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         name: name?,
         file: path.to_owned(),
         hash: 0,
-        robot_file: robot_file?,
+        robot: robot?,
         controller,
         timing,
         realtime,
@@ -137,6 +143,41 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         reference,
         strategies,
     })
+}
+
+/// The arm of the `[robot]` table: a URDF, and what the cell adds to it.
+fn read_robot(root: &Table<'_>, folder: &Path, reading: &Reading) -> Option<Robot> {
+    let table = root.table("robot")?;
+    let file = beside(folder, &table.text("urdf")?);
+    let list = |bound: &Bound| table.has(bound.key).then(|| table.list(bound));
+    let options = RobotOptions {
+        tcp: table.text_if("tcp"),
+        home: list(&HOME),
+        acceleration_max: list(&ACCELERATION),
+        jerk_max: list(&JERK),
+    };
+    let found = format!("\"{}\"", file.display());
+    let document = reading.open(&file, Some(table.fault_at("urdf", &found, "a URDF file", "")))?;
+    let robot = Robot::parse(&file, &document.text, &options).map_err(|faults| reading.note_all(faults)).ok()?;
+    let joints = robot.chain.joint_count();
+    for (key, list) in
+        [(HOME.key, &options.home), (ACCELERATION.key, &options.acceleration_max), (JERK.key, &options.jerk_max)]
+    {
+        if let Some(list) = list.as_ref().filter(|list| list.len() != joints) {
+            let found = format!("{} numbers", list.len());
+            table.refuse(key, &found, &format!("{joints} numbers"), "write one for each moving joint, base first");
+        }
+    }
+    for (index, joint) in robot.chain.joints().iter().enumerate() {
+        let Some(position) = options.home.as_ref().and_then(|home| home.get(index)) else { continue };
+        let (min, max) = (joint.position_min, joint.position_max);
+        if !(min..=max).contains(position) {
+            let allowed = format!("{min}..={max} rad");
+            let advice = "keep the resting configuration within the joint's limits";
+            table.refuse(HOME.key, &format!("{position} rad for {}", robot.joint_names[index]), &allowed, advice);
+        }
+    }
+    Some(robot)
 }
 
 fn read_store(root: &Table<'_>) -> Store {

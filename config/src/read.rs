@@ -299,6 +299,17 @@ impl<'d> Table<'d> {
         }
     }
 
+    /// As many numbers as stand there, each within the same bounds.
+    pub(crate) fn list(&self, bound: &Bound) -> Vec<f64> {
+        let Some(value) = self.take(bound.key) else { return Vec::new() };
+        let Some(array) = value.get_ref().as_array() else {
+            self.wrong_type(bound.key, value, &format!("numbers, each {}", bound.allowed()));
+            return Vec::new();
+        };
+        let item = |(index, item)| self.check(bound, format!("{}[{index}]", self.field(bound.key)), item);
+        array.iter().enumerate().map(item).collect()
+    }
+
     /// A text that is not empty.
     pub(crate) fn text(&self, key: &str) -> Option<String> {
         let Some(value) = self.take(key) else {

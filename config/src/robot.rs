@@ -108,7 +108,8 @@ impl Robot {
             return Err(faults);
         }
 
-        let of_robot = |error: &dyn std::fmt::Display| vec![source.fault_of_robot("", &error.to_string(), "", "mend the file")];
+        let of_robot =
+            |error: &dyn std::fmt::Display| vec![source.fault_of_robot("", &error.to_string(), "", "mend the file")];
         let chain = Chain::new(&joints, tree.tip_from_tcp).map_err(|error| of_robot(&error))?;
         let home = home(&chain, options);
         let body = body(&chain, &capsules, &home).map_err(|error| of_robot(&error))?;
@@ -125,7 +126,11 @@ impl Robot {
     }
 }
 
-fn body(chain: &Chain, capsules: &[LinkCapsule], home: &[f64; JOINTS_MAX]) -> Result<ArmBody, tandem_clearance::BodyError> {
+fn body(
+    chain: &Chain,
+    capsules: &[LinkCapsule],
+    home: &[f64; JOINTS_MAX],
+) -> Result<ArmBody, tandem_clearance::BodyError> {
     let pairs = contact::pairs_to_check(chain, capsules, home)?;
     ArmBody::new(capsules, &pairs)
 }

@@ -84,14 +84,19 @@ fn examine(cell: &Cell, store: Option<&str>) -> Vec<Finding> {
         },
     ];
     let mut also = |subject, result: Result<String, String>| findings.push(Finding { subject, result });
-    also("model", Perception::load(&cell.perception.model).map(|_| cell.perception.model.display().to_string()).map_err(|e| e.to_string()));
+    also(
+        "model",
+        Perception::load(&cell.perception.model)
+            .map(|_| cell.perception.model.display().to_string())
+            .map_err(|e| e.to_string()),
+    );
     also("controller", build_controller(cell).map(|_| "parameters accepted".to_owned()).map_err(|e| e.to_string()));
     also("plant", Plant::new(cell, 0).map(|_| "simulation builds".to_owned()).map_err(|e| e.to_string()));
     also(
         "store",
-        Store::open(&store_url(store, cell), &cell.strategies)
-            .and_then(|store| Ok((store.library()?, store.shown_url())))
-            .map(|(library, url)| format!("{} strategies in {url}", library.len()))
+        store_url(store, cell)
+            .and_then(|url| Store::open(&url))
+            .map(|store| format!("{} answers, its tables are up to date", store.shown_url()))
             .map_err(|e| e.to_string()),
     );
     findings

@@ -21,9 +21,15 @@ pub(super) fn doctor(args: &DoctorArgs) -> u8 {
             line["event"] = json!("check");
             anstream::println!("{line}");
         } else {
-            anstream::println!("{:9} {:22} {}", check.verdict.name(), check.name, check.found);
-            if check.verdict != Verdict::Ok {
-                anstream::println!("{:9} {:22} -> {}", "", "", check.fix);
+            let word = match check.verdict {
+                Verdict::Ok => "ok",
+                Verdict::Degraded => "degraded",
+                Verdict::Failed => "FAILED",
+            };
+            anstream::println!("{word:9} {:18} {}", check.name, check.found);
+            if let Some(fix) = &check.fix {
+                anstream::println!("{:28} {}", "", check.matters);
+                anstream::println!("{:28} -> {fix}", "");
             }
         }
     }

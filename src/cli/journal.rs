@@ -55,12 +55,18 @@ pub(super) fn journal(args: &JournalArgs) -> u8 {
 }
 
 fn answer(args: &JournalArgs) -> Result<(), String> {
-    let url = args.store.clone().unwrap_or_else(|| default_url(&args.cell));
-    let store = Store::open(&url, &[]).map_err(|error| error.to_string())?;
+    let store = open(args).map_err(|error| error.to_string())?;
     match &args.verb {
         Verb::List => list(&store, args.json).map_err(|error| error.to_string()),
         Verb::Show { run } => show(&steps(&store, run.as_deref())?, args.json),
         Verb::Export { run, output } => export(&steps(&store, run.as_deref())?, output.as_ref()),
+    }
+}
+
+fn open(args: &JournalArgs) -> Result<Store, StoreError> {
+    match &args.store {
+        Some(url) => Store::open(url),
+        None => Store::open(&default_url(&args.cell)?),
     }
 }
 
@@ -78,7 +84,7 @@ fn list(store: &Store, json: bool) -> Result<(), StoreError> {
         return Ok(());
     }
     let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(["run", "cell", "product", "boxes", "seed", "configuration", "outcome"]);
+    table.load_style(presets::NOTHING).set_header(["run", "cell", "product", "boxes", "seed", "configuration", "outcome"]);
     for PastRun { record, outcome } in &runs {
         table.add_row([
             record.id.clone(),

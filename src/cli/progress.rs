@@ -64,7 +64,19 @@ impl Screen {
 /// The line of a finished step: who, what was seen, how, how long, how near.
 fn step(time: f64, kind: &EventKind) -> String {
     let EventKind::StepDone {
-        step, label, outcome, who, class, confidence, mode, tool, form, attempts, duration_s, clearance_min_m, ..
+        step,
+        label,
+        outcome,
+        who,
+        class,
+        confidence,
+        mode,
+        tool,
+        form,
+        attempts,
+        duration_s,
+        clearance_min_m,
+        ..
     } = kind
     else {
         return String::new();

@@ -51,14 +51,13 @@ pub(super) fn run(args: &RunArgs) -> u8 {
         Ok(cell) => cell,
         Err(faults) => return check::report_faults(&faults, args.json),
     };
-    let mut store = match Store::open(&store_url(args.store.as_deref(), &cell), &cell.strategies) {
-        Ok(store) => store,
-        Err(error) => return refuse(&error),
-    };
     let record = record(args, &cell);
-    let library = match store.begin(&record).and_then(|()| store.library()) {
-        Ok(library) => library,
-        Err(error) => return refuse(&error),
+    let (mut store, library) = match open_store(args.store.as_deref(), &cell, &record) {
+        Ok(opened) => opened,
+        Err(error) => {
+            anstream::eprintln!("{error}");
+            return exit::CONFIG;
+        }
     };
     let options = RunOptions { boxes: args.boxes, seed: args.seed, run_id: record.id.clone() };
     let began = Instant::now();
@@ -92,13 +91,20 @@ pub(super) fn run(args: &RunArgs) -> u8 {
 }
 
 /// The database a cell keeps its library and journal in.
-pub(super) fn store_url(chosen: Option<&str>, cell: &Cell) -> String {
-    chosen.map(str::to_owned).or_else(|| cell.store.url.clone()).unwrap_or_else(|| default_url(&cell.name))
+pub(super) fn store_url(chosen: Option<&str>, cell: &Cell) -> Result<String, StoreError> {
+    match chosen.or(cell.store.url.as_deref()) {
+        Some(url) => Ok(url.to_owned()),
+        None => default_url(&cell.name),
+    }
 }
 
-fn refuse(error: &StoreError) -> u8 {
-    anstream::eprintln!("{error}");
-    exit::CONFIG
+/// Opens the store, records that the run begins, and reads the library.
+fn open_store(chosen: Option<&str>, cell: &Cell, record: &RunRecord) -> Result<(Store, Library), StoreError> {
+    let store = Store::open(&store_url(chosen, cell)?)?;
+    store.seed(&cell.strategies)?;
+    store.begin(record)?;
+    let library = store.library()?;
+    Ok((store, library))
 }
 
 /// A run is named after the instant it began; two in one nanosecond have different processes.
@@ -179,7 +185,7 @@ fn table(summary: &Summary, wall_time_s: f64) -> Table {
         ("seed", summary.seed.to_string()),
     ];
     let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(["product", summary.product.as_str()]);
+    table.load_style(presets::NOTHING).set_header(["product", summary.product.as_str()]);
     for (name, value) in rows {
         table.add_row([name.to_owned(), value]);
     }

@@ -5,8 +5,20 @@ use comfy_table::{Cell, CellAlignment, Table, presets};
 use crate::strategy::JournalEntry;
 
 const COLUMNS: [&str; 14] = [
-    "serial", "step", "attempt", "part", "state", "time_s", "duration_s", "subject", "class", "confidence", "mode",
-    "tool", "form", "clearance_min_m",
+    "serial",
+    "step",
+    "attempt",
+    "part",
+    "state",
+    "time_s",
+    "duration_s",
+    "subject",
+    "class",
+    "confidence",
+    "mode",
+    "tool",
+    "form",
+    "clearance_min_m",
 ];
 
 fn fields(step: &JournalEntry) -> [String; 14] {
@@ -31,7 +43,7 @@ fn fields(step: &JournalEntry) -> [String; 14] {
 /// The steps for the screen.
 pub(super) fn steps(steps: &[JournalEntry]) -> Table {
     let mut table = Table::new();
-    table.load_preset(presets::NOTHING).set_header(COLUMNS);
+    table.load_style(presets::NOTHING).set_header(COLUMNS);
     for step in steps {
         table.add_row(fields(step).map(|field| {
             let numeric = field.parse::<f64>().is_ok();

@@ -53,7 +53,8 @@ pub(super) fn train(args: &TrainArgs) -> u8 {
         resume: args.resume,
     };
     let bar = ProgressBar::new(0).with_style(
-        ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar()),
+        ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {eta}")
+            .unwrap_or_else(|_| ProgressStyle::default_bar()),
     );
     let result = encoder::train(&options, &mut |progress| show(&bar, args.epochs, progress));
     bar.finish_and_clear();
@@ -91,7 +92,8 @@ fn show(bar: &ProgressBar, epochs: usize, progress: &TrainProgress) {
             bar.set_position(((epoch - 1) * steps + step) as u64);
         }
         TrainProgress::Epoch(epoch, accuracy, points, rate) => {
-            let line = format!("epoch {epoch}: accuracy {accuracy:.4}, points {points:.4} (validation), {rate:.0} clouds/s");
+            let line =
+                format!("epoch {epoch}: accuracy {accuracy:.4}, points {points:.4} (validation), {rate:.0} clouds/s");
             if bar.is_hidden() { anstream::eprintln!("{line}") } else { bar.println(line) }
         }
         TrainProgress::Test => bar.set_message("measuring on the test split"),

@@ -93,8 +93,7 @@ fn chosen(line: &str) -> Option<&str> {
 }
 
 /// Looks at this host. Takes about a second; needs no rights, though with some it sees more.
-/// `flush` is the folder of the journal's database.
-pub fn examine(flush: &Path) -> Vec<Check> {
+pub fn examine() -> Vec<Check> {
     let host = Host::this();
     vec![
         machine::processors(),
@@ -112,7 +111,7 @@ pub fn examine(flush: &Path) -> Vec<Check> {
         memory::shared_memory(Path::new("/dev/shm")),
         storage::run_directory(),
         storage::leftovers(),
-        storage::flush(flush),
+        storage::flush(&storage::state_folder()),
         trial::wake_up(),
     ]
 }
@@ -146,8 +145,7 @@ mod tests {
     /// Every check has its own name, and whatever is not well has a fix.
     #[test]
     fn a_host_is_examined_and_every_trouble_has_a_fix() {
-        let folder = TempDir::new().expect("a temporary directory");
-        let checks = examine(folder.path());
+        let checks = examine();
         let mut names: Vec<_> = checks.iter().map(|check| check.name).collect();
         names.sort_unstable();
         names.dedup();

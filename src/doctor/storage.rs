@@ -2,7 +2,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use super::Check;
@@ -48,6 +48,13 @@ pub(super) fn leftovers() -> Check {
     Check::degraded(NAME, names.join(", "), matters, fix)
 }
 
+/// Where the journal lies unless the cell file says otherwise; see [`crate::strategy::store::default_url`].
+pub(super) fn state_folder() -> PathBuf {
+    let home = || Some(PathBuf::from(std::env::var_os("HOME")?).join(".local/state"));
+    let state = std::env::var_os("XDG_STATE_HOME").map(PathBuf::from).or_else(home);
+    state.map_or_else(std::env::temp_dir, |state| state.join("tandem"))
+}
+
 pub(super) fn flush(folder: &Path) -> Check {
     const NAME: &str = "flush";
     let matters = "the next step begins when the journal entry of the last one is on disk";
@@ -57,7 +64,12 @@ pub(super) fn flush(folder: &Path) -> Check {
             if time <= FLUSH_GOOD {
                 Check::ok(NAME, found, matters)
             } else {
-                Check::degraded(NAME, found, matters, "put the journal on a faster disk: `[store] url` in the cell file")
+                Check::degraded(
+                    NAME,
+                    found,
+                    matters,
+                    "put the journal on a faster disk: `[store] url` in the cell file",
+                )
             }
         }
         Err(error) => Check::failed(

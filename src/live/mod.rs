@@ -26,7 +26,7 @@ mod journal;
 mod rollcall;
 mod rundir;
 mod shell;
-mod signals;
+pub mod signals;
 mod spawn;
 mod supervise;
 mod warden;

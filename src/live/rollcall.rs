@@ -49,13 +49,7 @@ impl RollCall {
 
     /// One cycle: takes in what the warden reports and whether the roles' streams
     /// have moved; has those killed that were found silent.
-    pub(super) fn call(
-        &mut self,
-        now: Stamp,
-        reports: &mpsc::Receiver<Report>,
-        heard: &[Header; 3],
-        orders: &Orders,
-    ) {
+    pub(super) fn call(&mut self, now: Stamp, reports: &mpsc::Receiver<Report>, heard: &[Header; 3], orders: &Orders) {
         for report in reports.try_iter() {
             self.note(now, report);
         }
@@ -145,6 +139,6 @@ fn fault(loss: Loss) -> RoleFault {
         Loss::Killed { .. } => RoleFault::Killed,
         Loss::Exited { .. } => RoleFault::Exited,
         Loss::Silent => RoleFault::Silent,
-        Loss::NeverReady => RoleFault::Unresponsive,
+        Loss::NeverReady => RoleFault::Unstartable,
     }
 }

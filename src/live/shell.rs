@@ -8,7 +8,7 @@ use std::io::{self, Write as _};
 use std::time::Duration;
 
 use rustix::process::{Pid, getppid};
-use tandem_bus::Publisher;
+use tandem_bus::{Publisher, Write as _};
 use tandem_cycle::setup::{self, Granted, Wish};
 use tandem_cycle::{FixedRate, Grid, Monotonic};
 use tandem_config::{Cell, Policy, Schedule};

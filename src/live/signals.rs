@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 static ASKED: AtomicU32 = AtomicU32::new(0);
 
 /// How often this process was asked to end.
-pub(super) fn asked() -> u32 {
+pub fn asked() -> u32 {
     ASKED.load(Ordering::Relaxed)
 }
 
@@ -20,7 +20,7 @@ extern "C" fn count(_signal: libc::c_int) {
 ///
 /// # Errors
 /// What the kernel says.
-pub(super) fn listen() -> io::Result<()> {
+pub fn listen() -> io::Result<()> {
     ASKED.store(0, Ordering::Relaxed);
     for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
         // SAFETY: sigaction is plain numbers, for which zeros are valid.

@@ -3,7 +3,7 @@
 use std::sync::mpsc;
 use std::time::Duration;
 
-use tandem_bus::{Instance, Node};
+use tandem_bus::{Instance, Node, Write as _};
 use tandem_config::Cell;
 use tandem_cycle::{FixedRate, Monotonic};
 use tandem_msg::{Role, RoleStats, Stamp};
@@ -14,7 +14,7 @@ use super::rollcall::RollCall;
 use super::warden::{Orders, Report};
 use super::{LiveError, shell, signals};
 use crate::roles::{SupervisorRole, Surroundings, service};
-use crate::supervisor::{Event, Outcome, Supervisor};
+use crate::supervisor::{Event, Outcome, Summary, Supervisor};
 
 /// A measured state older than this does not say that the arm stands.
 const FRESH: Duration = Duration::from_millis(250);
@@ -32,6 +32,8 @@ const STANDSTILL: f64 = 0.01;
 pub struct Ended {
     /// What became of it.
     pub outcome: Outcome,
+    /// Its numbers.
+    pub summary: Summary,
     /// Time on the cell's clock since the loop began, seconds.
     pub time_s: f64,
     /// Health of each loop at the end, by role code.
@@ -107,7 +109,8 @@ impl Watch<'_> {
             {
                 let loops = roles.loops(shell::stats(Role::Supervisor, &rate, &granted));
                 let time_s = now.as_secs_f64() - start.as_secs_f64();
-                return Ok(Ended { outcome: end.outcome.clone(), time_s, loops, restarts: roles.restarts() });
+                let summary = role.summary();
+                return Ok(Ended { outcome: end.outcome.clone(), summary, time_s, loops, restarts: roles.restarts() });
             }
         }
     }
@@ -130,5 +133,5 @@ fn overdue(now: Stamp, asked_since: Option<Stamp>, roles: &RollCall) -> Option<O
         return Some(Outcome::Interrupted);
     }
     let (role, fault, since) = roles.gone()?;
-    (since.age_at(now) > YIELDING).then(|| Outcome::Fault { role, fault })
+    (since.age_at(now) > YIELDING).then_some(Outcome::Fault { role, fault })
 }

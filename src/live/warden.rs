@@ -132,13 +132,8 @@ impl Warden {
     ) -> Result<(Self, Orders), std::io::Error> {
         let wake = Arc::new(eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?);
         let (sender, orders) = mpsc::channel();
-        let places = CHILDREN.map(|role| Place {
-            role,
-            running: None,
-            epoch: 0,
-            restarts: 0,
-            start_at: Some(Instant::now()),
-        });
+        let places =
+            CHILDREN.map(|role| Place { role, running: None, epoch: 0, restarts: 0, start_at: Some(Instant::now()) });
         let told = Orders { sender, wake: Arc::clone(&wake) };
         Ok((Self { plan, instance, places, orders, wake, reports, ending: None }, told))
     }
@@ -186,10 +181,8 @@ impl Warden {
         let due = self.places.iter().filter_map(|place| place.start_at).chain(self.ending).min();
         // Once patience has ended the killed are waited for, without spinning.
         let left = due.map(|at| at.saturating_duration_since(Instant::now()).max(Duration::from_millis(1)));
-        let timeout = left.map(|left| Timespec {
-            tv_sec: left.as_secs() as i64,
-            tv_nsec: i64::from(left.subsec_nanos()),
-        });
+        let timeout =
+            left.map(|left| Timespec { tv_sec: left.as_secs() as i64, tv_nsec: i64::from(left.subsec_nanos()) });
         let mut fds = vec![PollFd::from_borrowed_fd(self.wake.as_fd(), PollFlags::IN)];
         let running = self.places.iter().filter_map(|place| place.running.as_ref());
         fds.extend(running.map(|running| PollFd::from_borrowed_fd(running.pidfd.as_fd(), PollFlags::IN)));

@@ -125,7 +125,7 @@ impl SimCell {
     /// A role that could not be started anew, or a run that has lost its way.
     pub fn run(
         &mut self,
-        store: &mut Store,
+        store: &Store,
         on_event: &mut dyn FnMut(&Event),
         mut until: impl FnMut(&Self) -> bool,
     ) -> Result<Option<Outcome>, SimError> {
@@ -142,8 +142,16 @@ impl SimCell {
         Ok(None)
     }
 
-    /// Runs the next role of the schedule.
-    fn step(&mut self, store: &mut Store, on_event: &mut dyn FnMut(&Event)) -> Result<Option<Outcome>, SimError> {
+    /// Fastest joint as measured, rad/s.
+    pub fn joint_speed_max(&self) -> f64 {
+        self.supervisor.arm().velocity.iter().fold(0.0, |fastest, velocity| fastest.max(velocity.abs()))
+    }
+
+    /// Runs the next role of the schedule; an outcome ends the run.
+    ///
+    /// # Errors
+    /// A role that could not be started anew.
+    pub fn step(&mut self, store: &Store, on_event: &mut dyn FnMut(&Event)) -> Result<Option<Outcome>, SimError> {
         let (role, now) = self.schedule.advance();
         self.now = now;
         if let Some(loss) = self.lost[role.code() as usize] {
@@ -161,7 +169,7 @@ impl SimCell {
         Ok(None)
     }
 
-    fn supervise(&mut self, now: Stamp, store: &mut Store, on_event: &mut dyn FnMut(&Event)) -> Option<Outcome> {
+    fn supervise(&mut self, now: Stamp, store: &Store, on_event: &mut dyn FnMut(&Event)) -> Option<Outcome> {
         for (health, lost) in self.around.roles.iter_mut().zip(&self.lost) {
             *health = lost.map_or(RoleHealth::Up, |loss| RoleHealth::Lost { fault: loss.fault });
         }

@@ -10,6 +10,7 @@
 //! **Invariant:** the same cloud gives the same feature, bit for bit, on one machine.
 
 pub mod card;
+mod columns;
 pub mod fit;
 mod grid;
 pub mod model;
@@ -108,7 +109,8 @@ impl Perception {
         let sample = self.sampler.sample(cloud)?;
         let answer = self.model.answer(&sample)?;
         let probabilities = self.model.probabilities(&answer.logits);
-        let best = (0..FEATURE_CLASSES).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))?;
+        let best =
+            (0..FEATURE_CLASSES).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))?;
         let class = *FeatureClass::ALL.iter().find(|class| class.code() as usize == best)?;
         let fit = fit(cloud, &sample, &answer.segment, class).filter(finite);
         let segment_count = answer.segment.iter().filter(|s| **s).count() as u32;

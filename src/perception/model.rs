@@ -140,7 +140,7 @@ impl Model {
 
     /// Asks the model about a sample; `None` if the answer is not finite.
     pub fn answer(&self, sample: &Sample) -> Option<Answer> {
-        let input = Input::of(&[sample], &Device::Cpu).ok()?;
+        let input = Input::of(&[sample], 1, &Device::Cpu).ok()?;
         let output = self.network.forward(&input, None).ok()?;
         let logits = output.class_logits.flatten_all().ok()?.to_vec1::<f32>().ok()?;
         let logits: [f32; FEATURE_CLASSES] = logits.try_into().ok()?;

@@ -1,7 +1,7 @@
 //! The encoder–decoder network (Section 2.1, Fig. 3 of the paper), a point-cloud transformer.
 //!
 //! ```text
-//! 512 points × 7 ── groups 64 × 16 × 10 ── embed 64, 64 ── max over members ── 64 tokens × 64
+//! 512 points × 7 ── groups 64 × 16 × 10 ── embed 32, 64 ── max over members ── 64 tokens × 64
 //!   ── 4 × offset attention (q and k share weights, 16 wide) ── tokens and all four layers: 320
 //!   ── fuse 256 ──┬─ max and mean over tokens: 512 ── 128 ── 8 class logits
 //!                 └─ to each point from its nearest centre + own 10 + cloud 512 ── 64 ── 32 ── 1 segment logit
@@ -22,6 +22,8 @@ use super::sample::{CENTRES, CHANNELS, NEIGHBOURS, POINTS, Sample};
 
 /// Name of the architecture, in cards.
 pub const ARCHITECTURE: &str = "pct-512-64x16-d64-4";
+/// Width of a group member.
+const EMBED: usize = 32;
 /// Width of a token.
 const WIDTH: usize = 64;
 /// Width of queries and keys.
@@ -133,7 +135,7 @@ impl Attention {
     fn forward(&self, x: &Tensor, places: &Tensor, batch: usize, training: bool) -> Result<Tensor> {
         let x = (x + places.matmul(&self.place)?)?;
         let key = x.matmul(&self.key)?.reshape((batch, CENTRES, KEY_WIDTH))?;
-        let energy = key.matmul(&key.transpose(1, 2)?.contiguous()?)?;
+        let energy = (key.matmul(&key.transpose(1, 2)?.contiguous()?)? * (KEY_WIDTH as f64).powf(-0.5))?;
         let attention = energy.apply_op1(Softmax)?;
         // Softmax over the keys, then L1 over the queries, as in PCT: damps tokens all look at.
         let attention = attention.broadcast_div(&(attention.sum_keepdim(1)? + 1e-9)?)?;
@@ -151,23 +153,23 @@ pub struct Input {
     members: Tensor,
     /// batch·centres × 3.
     places: Tensor,
-    /// batch·points × 10.
+    /// batch·points/stride × 10.
     points: Tensor,
-    /// Row of each point's centre, batch·points.
+    /// Row of each of these points' centre.
     home: Tensor,
 }
 
 impl Input {
-    /// The batch of these samples.
+    /// The batch of these samples; every `stride`-th point is segmented.
     ///
     /// # Errors
     /// As candle reports them; none for well-formed samples.
-    pub fn of(samples: &[&Sample], device: &Device) -> Result<Self> {
+    pub fn of(samples: &[&Sample], stride: usize, device: &Device) -> Result<Self> {
         let batch = samples.len();
         let mut members = Vec::with_capacity(batch * CENTRES * NEIGHBOURS * MEMBER);
         let mut places = Vec::with_capacity(batch * CENTRES * 3);
-        let mut points = Vec::with_capacity(batch * POINTS * MEMBER);
-        let mut home = Vec::with_capacity(batch * POINTS);
+        let mut points = Vec::with_capacity(batch * POINTS.div_ceil(stride) * MEMBER);
+        let mut home = Vec::with_capacity(batch * POINTS.div_ceil(stride));
         let zoomed = |p: &[f32; CHANNELS], c: &[f32; CHANNELS], out: &mut Vec<f32>| {
             out.extend((0..3).map(|k| (p[k] - c[k]) * ZOOM[0]));
             out.extend_from_slice(&p[..6]);
@@ -181,7 +183,7 @@ impl Input {
                     zoomed(&sample.points[usize::from(member)], c, &mut members);
                 }
             }
-            for (p, &token) in sample.points.iter().zip(&sample.home) {
+            for (p, &token) in sample.points.iter().zip(&sample.home).step_by(stride) {
                 let c = &sample.points[usize::from(sample.centres[usize::from(token)])];
                 zoomed(p, c, &mut points);
                 home.push((b * CENTRES) as u32 + u32::from(token));
@@ -191,8 +193,8 @@ impl Input {
             batch,
             members: Tensor::from_vec(members, (batch * CENTRES * NEIGHBOURS, MEMBER), device)?,
             places: Tensor::from_vec(places, (batch * CENTRES, 3), device)?,
-            points: Tensor::from_vec(points, (batch * POINTS, MEMBER), device)?,
-            home: Tensor::from_vec(home, batch * POINTS, device)?,
+            points: Tensor::from_vec(points, (home.len(), MEMBER), device)?,
+            home: Tensor::new(home, device)?,
         })
     }
 }
@@ -202,7 +204,7 @@ impl Input {
 pub struct Output {
     /// Batch × classes.
     pub class_logits: Tensor,
-    /// Batch·points: above 0 for points of the feature.
+    /// Batch·points/stride: above 0 for points of the feature.
     pub segment_logits: Tensor,
 }
 
@@ -231,8 +233,8 @@ impl Network {
     pub fn new(source: &mut dyn Source) -> Result<Self> {
         Ok(Self {
             embed: [
-                Block::new(source, "encoder.embed.0", MEMBER, WIDTH)?,
-                Block::new(source, "encoder.embed.1", WIDTH, WIDTH)?,
+                Block::new(source, "encoder.embed.0", MEMBER, EMBED)?,
+                Block::new(source, "encoder.embed.1", EMBED, WIDTH)?,
             ],
             attention: (0..LAYERS)
                 .map(|i| Attention::new(source, &format!("encoder.attention.{i}")))
@@ -259,8 +261,7 @@ impl Network {
         let (training, batch) = (dropout.is_some(), input.batch);
         let embedded = self.embed[0].forward(&input.members, training)?;
         let embedded = self.embed[1].forward(&embedded, training)?;
-        let mut x =
-            embedded.reshape((batch * CENTRES, NEIGHBOURS, WIDTH))?.apply_op1(MaxOverMembers)?;
+        let mut x = embedded.reshape((batch * CENTRES, NEIGHBOURS, WIDTH))?.apply_op1(MaxOverMembers)?;
         let mut layers = vec![x.clone()];
         for attention in &self.attention {
             x = attention.forward(&x, &input.places, batch, training)?;

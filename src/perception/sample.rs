@@ -17,6 +17,7 @@ use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rand_chacha::ChaCha8Rng;
 
+use super::columns::Columns;
 use super::grid::{Grid, moments, smallest_axis};
 
 /// Points the network reads.
@@ -221,31 +222,17 @@ fn farthest_points(places: &[[f32; 3]], count: usize) -> Vec<u16> {
     if count == 0 {
         return chosen;
     }
-    let weight: Vec<f32> = places
-        .iter()
-        .map(|p| {
-            let off_axis = (p[0] * p[0] + p[1] * p[1]).sqrt();
-            // Stray points, far out of the scan, are never the farthest.
-            if off_axis > 2.0 || p[2].abs() > 2.0 { 1e-6 } else { (0.25 + off_axis).powi(-2) }
-        })
-        .collect();
-    let mut gap = vec![f32::INFINITY; places.len()];
+    let weights = Columns::filled(places.iter().map(|p| {
+        let off_axis = (p[0] * p[0] + p[1] * p[1]).sqrt();
+        // Stray points, far out of the scan, are never the farthest.
+        if off_axis > 2.0 || p[2].abs() > 2.0 { 1e-6 } else { (0.25 + off_axis).powi(-2) }
+    }));
+    let columns = Columns::of(places.iter().copied());
+    let mut gaps = Columns::filled(places.iter().map(|_| f32::MAX));
     let mut next = (0..places.len()).min_by(|&a, &b| squared(places[a]).total_cmp(&squared(places[b]))).unwrap_or(0);
     for _ in 0..count {
         chosen.push(next as u16);
-        let from = places[next];
-        let mut best = -1.0_f32;
-        let mut at = 0;
-        for (i, ((p, g), w)) in places.iter().zip(&mut gap).zip(&weight).enumerate() {
-            let d = squared(sub(*p, from));
-            *g = g.min(d);
-            let reach = *g * w;
-            if reach > best {
-                best = reach;
-                at = i;
-            }
-        }
-        next = at;
+        next = columns.farthest(places[next], &mut gaps, &weights);
     }
     chosen
 }

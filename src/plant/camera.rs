@@ -183,11 +183,8 @@ impl Camera {
             }
             let gauss: f32 = StandardNormal.sample(rng);
             let sigma = self.range_sigma as f32 * (0.5 + 0.5 / cosine.max(0.2));
-            let stray = if rng.random::<f32>() < self.outliers as f32 {
-                half_width * rng.random_range(-0.5..0.5)
-            } else {
-                0.0
-            };
+            let stray =
+                if rng.random::<f32>() < self.outliers as f32 { half_width * rng.random_range(-0.5..0.5) } else { 0.0 };
             let range = range + sigma * gauss + stray;
             let material = if of_part > of_scene { Material::Surroundings } else { material };
             point(ray.map(|v| v * range), material);

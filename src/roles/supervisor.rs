@@ -2,8 +2,8 @@
 
 use tandem_bus::{Read, Write};
 use tandem_msg::{
-    CellRequest, CellState, Feature, Header, HumanState, JointState, MotionStatus, MotionTask, OperatorEvent, Prompt, Scene,
-    Stamp,
+    CellRequest, CellState, Feature, Header, HumanState, JointState, MotionStatus, MotionTask, OperatorEvent, Prompt,
+    Scene, Stamp,
 };
 
 use super::{Ports, service};

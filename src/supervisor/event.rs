@@ -280,6 +280,18 @@ pub enum Outcome {
     },
 }
 
+impl std::fmt::Display for Outcome {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Completed => f.write_str("completed"),
+            Self::Failed { reason } => write!(f, "failed: {reason}"),
+            Self::Interrupted => f.write_str("interrupted: the arm was stopped first"),
+            Self::Fault { role, fault } => write!(f, "stopped by a fault of {role}: {fault}"),
+            Self::TimedOut { waiting_for } => write!(f, "gave up waiting for {waiting_for}"),
+        }
+    }
+}
+
 impl Outcome {
     /// One word for it, as the store keeps it.
     pub fn name(&self) -> &'static str {

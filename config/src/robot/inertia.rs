@@ -27,12 +27,7 @@ struct Part {
 }
 
 /// The links of the chain; a moving one without a mass that can be is noted.
-pub(super) fn links(
-    source: &Source,
-    urdf: &urdf_rs::Robot,
-    tree: &Tree,
-    faults: &mut Vec<Fault>,
-) -> Vec<LinkInertia> {
+pub(super) fn links(source: &Source, urdf: &urdf_rs::Robot, tree: &Tree, faults: &mut Vec<Fault>) -> Vec<LinkInertia> {
     let mut links = Vec::new();
     for link in 0..=tree.chain.len() {
         let mut parts = Vec::new();
@@ -45,7 +40,15 @@ pub(super) fn links(
                     let found = format!("mass = {mass} kg with its inertia");
                     let allowed = "a mass of at least 0 kg and finite numbers";
                     let advice = "write what the link weighs";
-                    faults.push(source.fault_in("link", &file_link.name, "inertial", "inertial", &found, allowed, advice));
+                    faults.push(source.fault_in(
+                        "link",
+                        &file_link.name,
+                        "inertial",
+                        "inertial",
+                        &found,
+                        allowed,
+                        advice,
+                    ));
                 }
             }
         }

@@ -80,9 +80,8 @@ fn covering(geometry: &Geometry) -> Option<Vec<([Vector3<f64>; 2], f64)>> {
     let sound = |sizes: &[f64]| sizes.iter().all(|size| size.is_finite() && *size > 0.0);
     match *geometry {
         Geometry::Sphere { radius } => sound(&[radius]).then(|| vec![([Vector3::zeros(); 2], radius)]),
-        Geometry::Capsule { radius, length } => {
-            sound(&[radius, length]).then(|| vec![([Vector3::z() * (-length / 2.0), Vector3::z() * (length / 2.0)], radius)])
-        }
+        Geometry::Capsule { radius, length } => sound(&[radius, length])
+            .then(|| vec![([Vector3::z() * (-length / 2.0), Vector3::z() * (length / 2.0)], radius)]),
         Geometry::Cylinder { radius, length } => sound(&[radius, length]).then(|| {
             let (reach, radius) = around_cylinder(radius, length / 2.0);
             vec![([Vector3::z() * -reach, Vector3::z() * reach], radius)]
@@ -95,11 +94,7 @@ fn covering(geometry: &Geometry) -> Option<Vec<([Vector3<f64>; 2], f64)>> {
 /// Half length and radius of a capsule whose round ends just hold the rims of a cylinder.
 fn around_cylinder(radius: f64, half_length: f64) -> (f64, f64) {
     let inset = radius * (WIDER * WIDER - 1.0_f64).sqrt();
-    if half_length > inset {
-        (half_length - inset, radius * WIDER)
-    } else {
-        (0.0, radius.hypot(half_length))
-    }
+    if half_length > inset { (half_length - inset, radius * WIDER) } else { (0.0, radius.hypot(half_length)) }
 }
 
 /// Capsules along the longest side, in a row along the second longest.

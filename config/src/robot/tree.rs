@@ -139,7 +139,8 @@ fn parents(
             (Some(parent), Some(child)) => match parents[child] {
                 None => parents[child] = Some((index, parent)),
                 Some((other, _)) => {
-                    let found = format!("\"{}\", which joint \"{}\" moves too", joint.child.link, urdf.joints[other].name);
+                    let found =
+                        format!("\"{}\", which joint \"{}\" moves too", joint.child.link, urdf.joints[other].name);
                     refuse("child", &found, "one joint a link", "an arm is one chain");
                 }
             },

@@ -58,6 +58,8 @@ pub(crate) struct Governor {
     /// Stops from each level's speed on the present path.
     stops: [Stop; LEVELS.len()],
     speeds: [f64; LEVELS.len()],
+    acceleration: f64,
+    jerk: f64,
     level: usize,
     enough_since: Option<Stamp>,
 }
@@ -68,6 +70,8 @@ impl Governor {
             params: *params,
             stops: [Stop { duration: REST_STOP, end: 0.0 }; LEVELS.len()],
             speeds: [0.0; LEVELS.len()],
+            acceleration: 1.0,
+            jerk: 1.0,
             level: 0,
             enough_since: None,
         }
@@ -76,6 +80,8 @@ impl Governor {
     /// Prepares for a path.
     pub(crate) fn take(&mut self, limits: &LawLimits) -> Result<(), Refused> {
         self.level = 0;
+        self.acceleration = limits.acceleration;
+        self.jerk = limits.jerk;
         for ((stop, speed), share) in self.stops.iter_mut().zip(&mut self.speeds).zip(LEVELS) {
             *speed = limits.velocity * share;
             let cruising = State { position: 0.0, velocity: *speed, acceleration: 0.0 };
@@ -125,16 +131,22 @@ impl Governor {
         self.enough_since = if enough { self.enough_since.or(Some(now)) } else { None };
     }
 
-    /// Chooses the level for the next cycle; `standing` when the law is at rest.
-    pub(crate) fn choose(&mut self, now: Stamp, person: &Person, gradient: f64, standing: bool) -> usize {
+    /// Chooses the level for the next cycle. `velocity` is the law's; `required` is what is owed
+    /// now: with less than the reserve above it the law goes over into its stop, which takes the
+    /// separation owed down as fast as a person of the credited speed can come nearer.
+    pub(crate) fn choose(&mut self, now: Stamp, person: &Person, gradient: f64, velocity: f64, required: f64) -> usize {
+        let standing = velocity <= 0.0;
         let mut best = 0;
         if person.nobody() {
             best = LEVELS.len();
         } else {
+            let room = standing || person.distance >= required + self.params.reserve;
             for (index, (stop, speed)) in self.stops.iter().zip(&self.speeds).enumerate() {
-                let owed = self.required(person, *speed, stop.end, stop.duration, gradient);
+                // While it speeds up, the arm has to take its acceleration back before it can brake.
+                let ramp = self.acceleration.min((self.jerk * (speed - velocity).max(0.0)).sqrt()) / self.jerk;
+                let owed = self.required(person, *speed, stop.end + speed * ramp, stop.duration + ramp, gradient);
                 let extra = if index + 1 > self.level { self.params.hysteresis } else { 0.0 };
-                if person.distance >= owed + self.params.reserve + extra {
+                if room && person.distance >= owed + self.params.reserve + extra {
                     best = index + 1;
                 }
             }
@@ -168,7 +180,7 @@ mod tests {
     }
 
     fn level_at(governor: &mut Governor, distance: f64) -> usize {
-        governor.choose(Stamp(0), &person(distance), 1.0, false)
+        governor.choose(Stamp(0), &person(distance), 1.0, 0.5, 0.0)
     }
 
     /// Nearer is never faster, nobody is full speed, touching is no speed.

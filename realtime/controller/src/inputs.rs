@@ -132,6 +132,10 @@ impl Watch {
             &mut causes,
             || scene_is_valid(inputs.scene),
         );
+        if causes.has(StopCause::SupervisorStale) {
+            // Who writes the scene is silent: that says it all.
+            causes.remove(StopCause::SceneInvalid);
+        }
         Heard { causes, arm, human, scene, task }
     }
 

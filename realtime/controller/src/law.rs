@@ -78,13 +78,35 @@ impl Law {
         Ok(Stop { duration, end: law.trajectory.at(duration)[0].position })
     }
 
-    /// Notes the level of speed it was made for.
-    pub(crate) fn for_level(self, level: usize) -> Self {
-        Self { level, ..self }
-    }
-
-    pub(crate) fn made_for(&self) -> usize {
-        self.level
+    /// The law that goes on at a level of speed: to `length`, no faster than `share` of the limit, or
+    /// to rest at level 0.
+    ///
+    /// Slowing down begins as the stop does, so that the separation owed falls as fast as it can,
+    /// and lets go of the brake in time to meet the new speed from above.
+    pub(crate) fn at_level(&self, level: usize, share: f64, length: f64, limits: &LawLimits) -> Result<Self, Refused> {
+        /// Rounding.
+        const ABOVE: f64 = 1.0 + 1e-6;
+        /// A law that is to be made again in the next cycle.
+        const PASSING: usize = usize::MAX;
+        let State { velocity, acceleration, .. } = self.state;
+        let slower = limits.scaled(share);
+        let braking = if self.stopping { Ok(*self) } else { Self::stop(self.state, limits) };
+        if level == 0 {
+            return braking;
+        }
+        if velocity > slower.velocity * ABOVE {
+            // Where the velocity comes to rest when the brake is let go now.
+            let settles_at = velocity - acceleration * acceleration / (2.0 * limits.jerk);
+            if acceleration > 0.0 || settles_at > slower.velocity {
+                return braking;
+            }
+            let passing = LawLimits { velocity, ..*limits };
+            return Ok(Self { level: PASSING, ..Self::to(length, self.state, &passing)? });
+        }
+        if self.stopping || self.level != level {
+            return Ok(Self { level, ..Self::to(length, self.state, &slower)? });
+        }
+        Ok(*self)
     }
 
     pub(crate) fn state(&self) -> State {

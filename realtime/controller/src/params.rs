@@ -157,6 +157,7 @@ impl fmt::Display for OutOfRange {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamsError(
     /// The values, in the order of the fields.
+    #[allow(clippy::disallowed_types, reason = "made before the first cycle")]
     pub Vec<OutOfRange>,
 );
 
@@ -179,6 +180,7 @@ impl Params {
     ///
     /// # Errors
     /// All values that are out of range, together.
+    #[allow(clippy::disallowed_types, reason = "made before the first cycle")]
     pub fn check(&self) -> Result<(), ParamsError> {
         let mut found = Vec::new();
         let mut value = |field, value: f64, min: f64, max: f64, unit| {
@@ -226,6 +228,7 @@ impl Params {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::disallowed_types, reason = "a test may allocate")]
     use super::*;
 
     #[test]

@@ -470,25 +470,14 @@ impl Controller {
 
     /// The law one period on, for the level chosen in the cycle before.
     fn next_law(&self, law: &Law, go: bool) -> Result<Law, Refused> {
-        let limits = self.motion.limits();
         let level = if go { self.law_level } else { 0 };
-        let changed = if level == 0 {
-            if law.stopping() { *law } else { Law::stop(law.state(), limits)? }
-        } else if law.stopping() || law.made_for() != level {
-            let scaled = limits.scaled(Governor::share(level));
-            Law::to(self.motion.path().length(), law.state(), &scaled)?.for_level(level)
-        } else {
-            *law
-        };
-        Ok(changed.advanced(self.period))
+        let next = law.at_level(level, Governor::share(level), self.motion.path().length(), self.motion.limits())?;
+        Ok(next.advanced(self.period))
     }
 
     /// A stop from where the law is now, one period on.
     fn stopped(&mut self, law: &Law) -> Option<Law> {
-        if law.stopping() {
-            return Some(law.advanced(self.period));
-        }
-        match Law::stop(law.state(), self.motion.limits()) {
+        match law.at_level(0, 0.0, self.motion.path().length(), self.motion.limits()) {
             Ok(stop) => Some(stop.advanced(self.period)),
             Err(Refused) => {
                 self.refused = true;
@@ -548,7 +537,7 @@ impl Controller {
                 causes.add(StopCause::Separation);
             }
         }
-        self.governor.choose(now, person, gradient, !moving)
+        self.governor.choose(now, person, gradient, state.velocity, self.required)
     }
 
     fn person(&self, now: Stamp) -> Person {

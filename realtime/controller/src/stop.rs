@@ -30,6 +30,10 @@ impl Causes {
         self.0 |= 1 << cause.code();
     }
 
+    pub(crate) fn remove(&mut self, cause: StopCause) {
+        self.0 &= !(1 << cause.code());
+    }
+
     pub(crate) fn has(self, cause: StopCause) -> bool {
         self.0 & (1 << cause.code()) != 0
     }

@@ -81,65 +81,32 @@ impl<const N: usize> Line<N> {
             }
         }
         let distance = quantities[0][leader];
-        let start = State {
-            position: 0.0,
-            ..input.start[leader]
-        };
-        let target = State {
-            position: distance,
-            ..input.target[leader]
-        };
-        Ok(Line {
-            task: Task::new(leader, input.interface[leader], &start, &target, &limits)?,
-            direction,
-        })
+        let start = State { position: 0.0, ..input.start[leader] };
+        let target = State { position: distance, ..input.target[leader] };
+        Ok(Line { task: Task::new(leader, input.interface[leader], &start, &target, &limits)?, direction })
     }
 
     /// The motion of joint `index`, given that of the line coordinate.
-    pub(crate) fn profile(
-        &self,
-        index: usize,
-        line: &Profile,
-        input: &Input<N>,
-        minimum: f64,
-    ) -> Profile {
+    pub(crate) fn profile(&self, index: usize, line: &Profile, input: &Input<N>, minimum: f64) -> Profile {
         let held = input.interface[index] == Interface::Position;
-        line.scaled(
-            self.direction[index],
-            input.start[index].position,
-            &input.target[index],
-            held,
-            minimum,
-        )
+        line.scaled(self.direction[index], input.start[index].position, &input.target[index], held, minimum)
     }
 }
 
 /// Narrows the limits of the line coordinate to what a joint with the share `direction` can do.
 fn tighten(limits: &mut Limits, own: &Limits, direction: f64) {
     let both = |low: f64, high: f64| {
-        if direction > 0.0 {
-            (low / direction, high / direction)
-        } else {
-            (high / direction, low / direction)
-        }
+        if direction > 0.0 { (low / direction, high / direction) } else { (high / direction, low / direction) }
     };
     let narrow = |low: &mut f64, high: &mut f64, own: (f64, f64)| {
         *low = low.max(own.0);
         *high = high.min(own.1);
     };
-    narrow(
-        &mut limits.velocity_min,
-        &mut limits.velocity_max,
-        both(own.velocity_min, own.velocity_max),
-    );
+    narrow(&mut limits.velocity_min, &mut limits.velocity_max, both(own.velocity_min, own.velocity_max));
     narrow(
         &mut limits.acceleration_min,
         &mut limits.acceleration_max,
         both(own.acceleration_min, own.acceleration_max),
     );
-    narrow(
-        &mut limits.jerk_min,
-        &mut limits.jerk_max,
-        both(own.jerk_min, own.jerk_max),
-    );
+    narrow(&mut limits.jerk_min, &mut limits.jerk_max, both(own.jerk_min, own.jerk_max));
 }

@@ -50,43 +50,20 @@ impl Task {
             Interface::Velocity => brake::acceleration_prefix(&joint),
         };
         let (begin, position) = Profile::empty(limits).prefix(&brake.steps, start.position);
-        let joint = Joint {
-            start: brake.end,
-            ..joint
-        };
+        let joint = Joint { start: brake.end, ..joint };
         let goal = match interface {
             Interface::Position => {
                 let tie = POSITION_TIE * (start.position.abs() + target.position.abs());
-                Goal::Position(Reach::new(
-                    joint,
-                    limits.velocity_min,
-                    target.position - position,
-                    tie,
-                ))
+                Goal::Position(Reach::new(joint, limits.velocity_min, target.position - position, tie))
             }
             Interface::Velocity => {
                 let swing = Swing::of(&joint);
-                Goal::Velocity(
-                    swing,
-                    swing.durations(joint.start[0].abs() + joint.end[0].abs()),
-                )
+                Goal::Velocity(swing, swing.durations(joint.start[0].abs() + joint.end[0].abs()))
             }
         };
-        let mut task = Task {
-            goal,
-            brake,
-            start: *start,
-            target: *target,
-            limits: *limits,
-            begin,
-            minimum: 0.0,
-        };
+        let mut task = Task { goal, brake, start: *start, target: *target, limits: *limits, begin, minimum: 0.0 };
         task.minimum = task.next(0.0).ok_or(Error::Unreachable { joint: index })?;
-        if task.minimum.is_finite() {
-            Ok(task)
-        } else {
-            Err(Error::OutOfRange { joint: index })
-        }
+        if task.minimum.is_finite() { Ok(task) } else { Err(Error::OutOfRange { joint: index }) }
     }
 
     /// The first possible duration not below `time`; `time` itself unchanged if it is possible.
@@ -96,11 +73,7 @@ impl Task {
             Goal::Position(reach) => reach.next(passed)?,
             Goal::Velocity(_, durations) => durations.next(passed),
         };
-        Some(if found <= passed {
-            time.max(self.begin)
-        } else {
-            self.begin + found
-        })
+        Some(if found <= passed { time.max(self.begin) } else { self.begin + found })
     }
 
     /// The motion that takes `duration`, which must be possible.
@@ -110,38 +83,17 @@ impl Task {
         match &self.goal {
             Goal::Position(reach) => {
                 let mixture = reach.mixture(duration - begin);
-                let (far, near) = (
-                    reach.far.phases(&mixture.far),
-                    reach.near.phases(&mixture.near),
-                );
-                let (end, _) = profile.mix(
-                    &far,
-                    &near,
-                    mixture.share,
-                    begin,
-                    duration - begin,
-                    position,
-                );
+                let (far, near) = (reach.far.phases(&mixture.far), reach.near.phases(&mixture.near));
+                let (end, _) = profile.mix(&far, &near, mixture.share, begin, duration - begin, position);
                 profile.finish(end.read_as(duration), self.target);
             }
             Goal::Velocity(swing, _) => {
                 let velocity = self.brake.end[0];
                 let (far, high) = swing.highest(duration - begin, velocity);
                 let (near, low) = swing.mirrored().highest(duration - begin, -velocity);
-                let share = if high + low > 0.0 {
-                    ((swing.gain + low) / (high + low)).clamp(0.0, 1.0)
-                } else {
-                    1.0
-                };
-                let (end, position) =
-                    profile.mix(&far, &near, share, begin, duration - begin, position);
-                profile.finish(
-                    end.read_as(duration),
-                    State {
-                        position,
-                        ..self.target
-                    },
-                );
+                let share = if high + low > 0.0 { ((swing.gain + low) / (high + low)).clamp(0.0, 1.0) } else { 1.0 };
+                let (end, position) = profile.mix(&far, &near, share, begin, duration - begin, position);
+                profile.finish(end.read_as(duration), State { position, ..self.target });
             }
         }
         profile.set_minimum(self.minimum);

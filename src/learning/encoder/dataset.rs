@@ -41,13 +41,7 @@ pub struct Example {
 /// frame) is left in `cloud`.
 ///
 /// Draws again, from the same stream, when hardly anything of the part came into view.
-pub fn example(
-    seed: u64,
-    split: Split,
-    index: u64,
-    sampler: &mut Sampler,
-    cloud: &mut Vec<[f32; 3]>,
-) -> Example {
+pub fn example(seed: u64, split: Split, index: u64, sampler: &mut Sampler, cloud: &mut Vec<[f32; 3]>) -> Example {
     // One generator a seed and split, one stream an example: no two share numbers.
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(4).wrapping_add(split as u64));
     rng.set_stream(index);

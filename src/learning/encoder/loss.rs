@@ -4,6 +4,7 @@ use candle_core::{D, Device, Result, Tensor};
 use tandem_msg::{Coded, FEATURE_CLASSES};
 
 use super::dataset::Example;
+use super::train::SEGMENT_STRIDE;
 use crate::perception::network::Output;
 
 /// Share of the label spread over all classes.
@@ -24,7 +25,9 @@ pub(crate) fn loss(output: &Output, examples: &[Example]) -> Result<Tensor> {
     let log_sum = shifted.exp()?.sum_keepdim(D::Minus1)?.log()?;
     let class = (labels * shifted.broadcast_sub(&log_sum)?)?.sum_all()?.affine(-1.0 / batch as f64, 0.0)?;
 
-    let marks: Vec<f32> = examples.iter().flat_map(|e| e.segment.iter().map(|s| f32::from(u8::from(*s)))).collect();
+    let marks: Vec<f32> = examples
+        .iter()
+        .flat_map(|e| e.segment.iter().step_by(SEGMENT_STRIDE).map(|s| f32::from(u8::from(*s)))).collect();
     let count = marks.len();
     let marks = Tensor::from_vec(marks, count, &Device::Cpu)?;
     // log(1 + exp(x)) − x·y, written so that neither end overflows.

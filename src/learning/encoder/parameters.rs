@@ -38,9 +38,10 @@ impl Parameters {
         }
         let count: usize = shape.iter().product();
         let numbers: Vec<f32> = match kind {
-            // He et al. 2015: variance 2 / inputs keeps the signal's size through ReLUs.
+            // Variance 1 / inputs: most layers are normalised anyway, and attention must not
+            // start out saturated.
             Kind::Matrix => {
-                let spread = (2.0 / shape[0] as f32).sqrt();
+                let spread = (1.0 / shape[0] as f32).sqrt();
                 (0..count)
                     .map(|_| {
                         let unit: f32 = StandardNormal.sample(&mut self.rng);

@@ -27,7 +27,7 @@ impl Answers {
         let mut out = Self { logits: Vec::new(), classes: Vec::new(), points_right: 0, points: 0 };
         for batch in examples.chunks(32) {
             let samples: Vec<_> = batch.iter().map(|e| &e.sample).collect();
-            let output = network.forward(&Input::of(&samples, &Device::Cpu)?, None)?;
+            let output = network.forward(&Input::of(&samples, 1, &Device::Cpu)?, None)?;
             for row in output.class_logits.to_vec2::<f32>()? {
                 out.logits.push(std::array::from_fn(|c| row.get(c).copied().unwrap_or(f32::NAN)));
             }

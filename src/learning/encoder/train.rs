@@ -20,7 +20,9 @@ use crate::perception::network::{ARCHITECTURE, Input, Network};
 use crate::perception::{CARD_FILE, Sampler, WEIGHTS_FILE};
 
 /// Examples of one step.
-const BATCH: usize = 32;
+const BATCH: usize = 16;
+/// Every so many points of a cloud are segmented in training; all are in use.
+pub(crate) const SEGMENT_STRIDE: usize = 2;
 /// Largest learning rate of the one-cycle schedule.
 const RATE: f32 = 3e-3;
 /// Share of the run in which the rate rises.
@@ -230,7 +232,7 @@ impl Run {
         for (step, batch) in order.chunks_exact(BATCH).enumerate() {
             let examples: Vec<Example> = batch.iter().map(|&i| augmented(&training[i], &mut rng)).collect();
             let samples: Vec<_> = examples.iter().map(|e| &e.sample).collect();
-            let input = Input::of(&samples, &Device::Cpu)?;
+            let input = Input::of(&samples, SEGMENT_STRIDE, &Device::Cpu)?;
             let mask = dropout_mask(BATCH, self.network.dropout_width(), &mut rng)?;
             let output = self.network.forward(&input, Some(&mask))?;
             let loss = loss(&output, &examples)?;
@@ -267,5 +269,9 @@ impl Run {
 /// One-cycle schedule: the rate rises in a cosine to [`RATE`] and falls in another to nothing.
 fn rate(done: f32) -> f32 {
     let half_cosine = |t: f32| 0.5 - 0.5 * (std::f32::consts::PI * t).cos();
-    if done < WARM { RATE * (0.04 + 0.96 * half_cosine(done / WARM)) } else { RATE * half_cosine((1.0 - done) / (1.0 - WARM)) }
+    if done < WARM {
+        RATE * (0.04 + 0.96 * half_cosine(done / WARM))
+    } else {
+        RATE * half_cosine((1.0 - done) / (1.0 - WARM))
+    }
 }

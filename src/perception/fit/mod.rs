@@ -21,7 +21,8 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tandem_msg::{FeatureClass, FeatureDimensions, Measured};
 
-use super::sample::{Sample, squared, sub};
+use super::columns::Columns;
+use super::sample::Sample;
 use plane::Plane;
 
 /// Dense points that take part in a fit, at most.
@@ -117,18 +118,15 @@ fn bare(plane: &Plane, dense: &Dense) -> Fit {
 
 /// Labels of the dense points: each takes that of the nearest sampled point.
 fn spread(cloud: &[[f32; 3]], sample: &Sample, segment: &[bool]) -> Dense {
-    let places: Vec<[f32; 3]> = sample.source.iter().map(|&i| cloud[usize::from(i)]).collect();
+    let of = |wanted: bool| {
+        let chosen = sample.source.iter().zip(segment).filter(move |(_, s)| **s == wanted);
+        Columns::of(chosen.map(|(&i, _)| cloud[usize::from(i)]))
+    };
+    let (on, off) = (of(true), of(false));
     let mut dense = Dense { feature: Vec::new(), rest: Vec::new() };
     let stride = cloud.len().div_ceil(DENSE).max(1);
     for p in cloud.iter().step_by(stride) {
-        let (mut nearest, mut label) = (f32::INFINITY, false);
-        for (place, is_feature) in places.iter().zip(segment) {
-            let d = squared(sub(*p, *place));
-            if d < nearest {
-                (nearest, label) = (d, *is_feature);
-            }
-        }
-        let to = if label { &mut dense.feature } else { &mut dense.rest };
+        let to = if on.nearest(*p) < off.nearest(*p) { &mut dense.feature } else { &mut dense.rest };
         to.push(wide(*p));
     }
     dense

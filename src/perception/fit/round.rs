@@ -28,8 +28,8 @@ struct Wall {
     slope: f64,
     /// Standard deviations of centre, radius.
     sigma: [f64; 2],
-    rms: f64,
-    inliers: usize,
+    /// Median distance of all flank points.
+    median: f64,
 }
 
 impl Wall {
@@ -57,15 +57,12 @@ pub(crate) fn fit(
     });
     // What stands out may stand on no surface that is seen: a plug at the end of a cable.
     let raised = !matches!(class, FeatureClass::ThreadedHole | FeatureClass::SmoothHole);
-    let by_normals = raised
-        .then(|| axis_of_normals(sample, segment, rng))
-        .flatten()
-        .and_then(|axis| {
-            let frame = Frame::on(middle, axis);
-            Some((frame, wall(&frame, dense, class, LEAN[1], rng)?))
-        });
+    let by_normals = raised.then(|| axis_of_normals(sample, segment, rng)).flatten().and_then(|axis| {
+        let frame = Frame::on(middle, axis);
+        Some((frame, wall(&frame, dense, class, LEAN[1], rng)?))
+    });
     let (frame, wall, on_surface) = match (by_surface, by_normals) {
-        (Some((f, w)), Some((_, free))) if 10 * w.inliers >= 8 * free.inliers => (f, w, true),
+        (Some((f, w)), Some((_, free))) if w.median <= 1.3 * free.median + 20e-6 => (f, w, true),
         (_, Some((f, w))) => (f, w, false),
         (Some((f, w)), None) => (f, w, true),
         (None, None) => return None,
@@ -111,39 +108,57 @@ fn wall(frame: &Frame, dense: &Dense, class: FeatureClass, lean: f64, rng: &mut 
     let (low, high) = (quantile(&mut heights, 0.03), quantile(&mut heights, 0.97));
     let span = high - low;
     // Floor, cap and chamfer are not wall.
-    let flank: Vec<Local> =
-        local.into_iter().filter(|p| p.z > low + 0.10 * span && p.z < high - 0.08 * span).collect();
+    let flank: Vec<Local> = local.into_iter().filter(|p| p.z > low + 0.10 * span && p.z < high - 0.08 * span).collect();
     if flank.len() < 10 {
         return None;
     }
     let cone = class == FeatureClass::Cone;
-    let (centre, radius) = circle(&flank, cone, rng)?;
-    let start = Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2], rms: 0.0, inliers: 0 };
+    let start = guess(&flank, cone, rng)?;
     refine(start, &flank, lean, cone)
 }
 
-/// The circle most flank points lie on, seen along the axis.
-fn circle(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<(Vector2<f64>, f64)> {
+/// The upright wall most flank points lie on: a circle through three points, for a cone
+/// three of about the same height and a fourth to say how the radius changes.
+fn guess(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<Wall> {
     let stride = flank.len().div_ceil(VOTERS);
-    let voters: Vec<&Local> = flank.iter().step_by(stride).collect();
+    let mut voters: Vec<&Local> = flank.iter().step_by(stride).collect();
+    voters.sort_unstable_by(|a, b| a.z.total_cmp(&b.z));
+    let count = voters.len();
+    let slice = if cone { (count / 8).max(4).min(count) } else { count };
     let extent = flank.iter().fold([f64::MAX, f64::MIN, f64::MAX, f64::MIN], |e, p| {
         [e[0].min(p.x), e[1].max(p.x), e[2].min(p.y), e[3].max(p.y)]
     });
     let widest = (extent[1] - extent[0]).max(extent[3] - extent[2]);
-    let mut best: Option<(usize, Vector2<f64>, f64)> = None;
-    for _ in 0..CIRCLES {
-        let [a, b, c] = [0; 3].map(|_| voters[rng.random_range(0..voters.len())].xy());
-        let Some((centre, radius)) = through(a, b, c) else { continue };
-        if radius > 1.2 * widest || radius < 0.1 * widest {
+    let mut best: Option<(usize, Wall)> = None;
+    for _ in 0..if cone { 3 * CIRCLES } else { CIRCLES } {
+        let first = rng.random_range(0..=count - slice);
+        let [a, b, c] = [0; 3].map(|_| voters[first + rng.random_range(0..slice)]);
+        let Some((centre, radius)) = through(a.xy(), b.xy(), c.xy()) else { continue };
+        if radius > 1.2 * widest || radius < 0.05 * widest {
             continue;
         }
-        let tolerance = radius * if cone { 4.0 * TOLERANCE } else { TOLERANCE };
-        let votes = voters.iter().filter(|p| ((p.xy() - centre).norm() - radius).abs() < tolerance).count();
+        let mut wall =
+            Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2], median: f64::MAX };
+        if cone {
+            let height = (a.z + b.z + c.z) / 3.0;
+            let other = voters[rng.random_range(0..count)];
+            let rise = other.z - height;
+            if rise.abs() < 1e-9 {
+                continue;
+            }
+            wall.slope = ((other.xy() - centre).norm() - radius) / rise;
+            wall.radius = radius - wall.slope * height;
+            if wall.slope.abs() > 1.5 {
+                continue;
+            }
+        }
+        let tolerance = radius * TOLERANCE;
+        let votes = voters.iter().filter(|p| wall.distance(p).1.abs() < tolerance).count();
         if best.is_none_or(|b| votes > b.0) {
-            best = Some((votes, centre, radius));
+            best = Some((votes, wall));
         }
     }
-    best.map(|(_, centre, radius)| (centre, radius))
+    best.map(|(_, wall)| wall)
 }
 
 /// Centre and radius of the circle through three points.
@@ -161,8 +176,8 @@ fn through(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>) -> Option<(Vector2
 /// Gauss–Newton on centre, lean, radius and slope, with Tukey weights. `lean` is the prior
 /// standard deviation of the lean, radians; cylinders keep their slope at nothing.
 fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall> {
-    let start = wall.radius;
-    let mut reach = start * if cone { 0.4 } else { 0.2 };
+    let start = flank.iter().map(|p| wall.radius + wall.slope * p.z).sum::<f64>() / flank.len() as f64;
+    let mut reach = 0.2 * start;
     for _ in 0..12 {
         let mut normal = SMatrix::<f64, 6, 6>::zeros();
         let mut right = SVector::<f64, 6>::zeros();
@@ -188,7 +203,9 @@ fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall
         }
         let rms = (squares / weight_sum).sqrt().max(10e-6);
         // Priors, in units of the measured noise.
-        for (k, prior, now) in [(2, lean, wall.lean.x), (3, lean, wall.lean.y), (5, if cone { 1.0 } else { 1e-6 }, wall.slope)] {
+        for (k, prior, now) in
+            [(2, lean, wall.lean.x), (3, lean, wall.lean.y), (5, if cone { 1.0 } else { 1e-6 }, wall.slope)]
+        {
             let stiffness = (rms / prior).powi(2);
             normal[(k, k)] += stiffness;
             right[k] -= stiffness * now;
@@ -199,12 +216,11 @@ fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall
         wall.lean += Vector2::new(step[2], step[3]);
         wall.radius += step[4];
         wall.slope += step[5];
-        wall.rms = rms;
-        wall.inliers = inliers;
         wall.sigma = [inverse[(0, 0)].max(inverse[(1, 1)]), inverse[(4, 4)]].map(|v| rms * v.max(0.0).sqrt());
-        reach = (6.0 * quantile(&mut off_wall, 0.5)).clamp(start * 0.02, reach);
+        wall.median = quantile(&mut off_wall, 0.5);
+        reach = (6.0 * wall.median).clamp(0.02 * start, reach);
     }
-    let sane = wall.radius > 0.0 && wall.radius < 4.0 * start && wall.lean.norm() < 1.0 && wall.slope.abs() < 2.0;
+    let sane = wall.radius > 0.1 * start && wall.radius < 6.0 * start && wall.lean.norm() < 1.0 && wall.slope.abs() < 2.0;
     sane.then_some(wall)
 }
 
@@ -230,12 +246,13 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
                 })
                 .collect();
             let pitch = thread::pitch(&wound, wall.radius);
-            // The wall is the mean of the profile; the major diameter lies half its height outside.
-            let height = match (class, pitch.value > 0.0) {
-                (FeatureClass::ThreadedHole, true) => 0.5413 * pitch.value,
-                (_, true) => 0.6134 * pitch.value,
-                (_, false) => 0.08 * wall.radius,
-            };
+            // Crests hide much of the roots, so that the wall fitted lies nearer to them: in a
+            // bore the major diameter is most of twice the profile's height outside, on an axis
+            // a little of it. Shares measured on generated threads.
+            let hole = class == FeatureClass::ThreadedHole;
+            let (height, share) = if hole { (0.5413, 1.7) } else { (0.6134, 0.38) };
+            let steepness = if pitch.value > 0.0 { pitch.value } else { 0.27 * wall.radius };
+            let height = height * share * steepness;
             (measured(2.0 * wall.radius + height, 2.0 * wall.sigma[1] + 0.3 * height), pitch)
         }
         FeatureClass::Cone => {

@@ -63,17 +63,26 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
     let deep = quantile(&mut heights, 0.85);
     let mut floor: Vec<f64> = heights.iter().copied().filter(|h| *h > 0.8 * deep).collect();
     let depth = quantile(&mut floor, 0.5);
+    // The surface ends at the chamfer; the wall, where one is seen, tells the plain width.
+    let across = Vector2::new(-along.y, along.x);
+    let mut walls: Vec<f64> = inside
+        .iter()
+        .filter(|p| p.z > -0.8 * depth && p.z < -0.35 * depth)
+        .map(|p| p.xy() - centre)
+        .filter(|p| along.dot(p).abs() < 0.5 * (length - width))
+        .map(|p| across.dot(&p).abs())
+        .collect();
+    if walls.len() >= 6 {
+        let chamfer = (0.5 * width - quantile(&mut walls, 0.5)).clamp(0.0, 0.12 * width);
+        (length, width) = (length - 2.0 * chamfer, width - 2.0 * chamfer);
+    }
     let dimensions = FeatureDimensions {
         length: if length_seen { measured(length, 0.5 * spacing) } else { measured(length, 0.3 * length) },
         width: measured(width, 0.3 * spacing),
         depth: measured(depth, plane.rms + 0.02 * depth),
         ..FeatureDimensions::default()
     };
-    let pose = frame.pose(
-        Vector3::new(centre.x, centre.y, 0.0),
-        Vector3::z(),
-        Vector3::new(along.x, along.y, 0.0),
-    );
+    let pose = frame.pose(Vector3::new(centre.x, centre.y, 0.0), Vector3::z(), Vector3::new(along.x, along.y, 0.0));
     Some(Fit { camera_from_feature: pose, dimensions })
 }
 

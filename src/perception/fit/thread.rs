@@ -42,6 +42,16 @@ pub(crate) fn pitch(points: &[[f64; 3]], radius: f64) -> Measured {
     let share: Vec<f64> =
         sums.iter().map(|s| 2.0 * (s[0] * s[0] + s[1] * s[1]) / (points.len() as f64 * power)).collect();
     let best = (0..FREQUENCIES).max_by(|&a, &b| share[a].total_cmp(&share[b]).then(b.cmp(&a))).unwrap_or(0);
+    // The profile is no sine: where its second harmonic stands out, half its frequency does too.
+    let half = (low + step * best as f64) / 2.0;
+    let below = ((half - low) / step).round();
+    let best = if below >= 2.0 {
+        let (from, to) = (below as usize - 2, (below as usize + 3).min(FREQUENCIES));
+        let fundamental = (from..to).max_by(|&a, &b| share[a].total_cmp(&share[b])).unwrap_or(best);
+        if share[fundamental] > 0.4 * share[best] { fundamental } else { best }
+    } else {
+        best
+    };
     if share[best] < POWER_MIN || best == 0 || best == FREQUENCIES - 1 {
         return Measured::default();
     }

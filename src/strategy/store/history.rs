@@ -19,7 +19,8 @@ impl Store {
     /// # Errors
     /// The database does not answer.
     pub fn runs(&self) -> Result<Vec<PastRun>, StoreError> {
-        let select = "SELECT id, cell, product, config_hash, seed, boxes, started_ns, outcome FROM run ORDER BY started_ns DESC";
+        let select =
+            "SELECT id, cell, product, config_hash, seed, boxes, started_ns, outcome FROM run ORDER BY started_ns DESC";
         let rows = self.run("list the runs", async { Ok(sqlx::query(select).fetch_all(&self.pool).await?) })?;
         let read = |row: &sqlx::any::AnyRow| -> Result<PastRun, sqlx::Error> {
             Ok(PastRun {
@@ -35,6 +36,9 @@ impl Store {
                 outcome: row.try_get(7)?,
             })
         };
-        rows.iter().map(read).collect::<Result<_, _>>().map_err(|error| StoreError::failed(&self.url, "list the runs", &error))
+        rows.iter()
+            .map(read)
+            .collect::<Result<_, _>>()
+            .map_err(|error| StoreError::failed(&self.url, "list the runs", &error))
     }
 }

@@ -43,14 +43,12 @@ pub struct Store {
 }
 
 impl Store {
-    /// Opens the database at `url`, brings its tables up to date and makes the library
-    /// hold `seeds`: rows that came from strategy files before are replaced by these,
-    /// rows of other origin stay.
+    /// Opens the database at `url`, makes it if it is SQLite and not there yet, and
+    /// brings its tables up to date.
     ///
     /// # Errors
-    /// The database cannot be reached or created, its tables cannot be brought up to date,
-    /// or a seed holds a number that is not finite.
-    pub fn open(url: &str, seeds: &[StrategyRow]) -> Result<Self, StoreError> {
+    /// The database cannot be reached or created, or its tables cannot be brought up to date.
+    pub fn open(url: &str) -> Result<Self, StoreError> {
         sqlx::any::install_default_drivers();
         let target = url::Target::parse(url)?;
         let runtime =
@@ -60,9 +58,17 @@ impl Store {
         {
             let _lock = schema::FileLock::take(&target)?;
             store.run("bring the tables up to date", schema::migrate(&store.pool, &target))?;
-            store.run("store the strategy files", library::sync(&store.pool, seeds))?;
         }
         Ok(store)
+    }
+
+    /// Makes the library hold `rows`: rows that came from strategy files before are
+    /// replaced by these, rows of other origin stay.
+    ///
+    /// # Errors
+    /// The database does not answer, or a number is not finite.
+    pub fn seed(&self, rows: &[StrategyRow]) -> Result<(), StoreError> {
+        self.run("store the strategy files", library::sync(&self.pool, rows))
     }
 
     /// The whole strategy library.

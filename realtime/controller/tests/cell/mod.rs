@@ -54,7 +54,7 @@ pub fn body() -> ArmBody {
     let capsule = |link, from, to, radius, tool| LinkCapsule { link, ends: [from, to], radius, tool };
     ArmBody::new(
         &[
-            capsule(1, [0.0, 0.0, 0.09], [0.0, 0.0, 0.13], 0.08, false),
+            capsule(1, [0.0, 0.0, 0.12], [0.0, 0.0, 0.14], 0.08, false),
             capsule(2, [0.0, 0.0, 0.17], [-0.612, 0.0, 0.17], 0.07, false),
             capsule(3, [0.0, 0.0, 0.04], [-0.5723, 0.0, 0.04], 0.055, false),
             capsule(4, [0.0, 0.0, 0.05], [0.0, 0.0, 0.14], 0.05, false),
@@ -163,7 +163,11 @@ pub struct Cell {
     pub tamper: Option<Tamper>,
     /// Offset the arm keeps from its command, rad: a brake that drags.
     pub drag: f64,
-    pub check_limits: bool,
+    /// Periods by which the tracked person is behind the real one.
+    pub late: u64,
+    /// The controller is shown nobody.
+    pub blind: bool,
+    past: Vec<HumanState>,
 }
 
 impl Cell {
@@ -192,6 +196,9 @@ impl Cell {
             scene: Scene { header: header(1), ..scene() },
             task: MotionTask { header: header(1), ..MotionTask::default() },
             findings: Findings {
+                velocity_excess: -1.0,
+                acceleration_excess: -1.0,
+                jerk_excess: -1.0,
                 clearance_min: f64::INFINITY,
                 separation_moving_min: f64::INFINITY,
                 ..Findings::default()
@@ -207,7 +214,9 @@ impl Cell {
             cycle: 0,
             tamper: None,
             drag: 0.0,
-            check_limits: true,
+            late: 0,
+            blind: false,
+            past: Vec::with_capacity(20_000),
         }
     }
 
@@ -252,15 +261,15 @@ impl Cell {
         header.stamp = now;
     }
 
-    /// One millisecond: everyone publishes, the controller runs, the arm follows, the referee looks.
-    pub fn step(&mut self) {
+    /// A millisecond passes and everyone publishes.
+    pub fn prepare(&mut self) {
         self.cycle += 1;
         self.now = self.now.after(Duration::from_millis(1));
         if self.arm_alive {
             Self::stamp(&mut self.arm.header, self.now);
         }
         if self.human_alive {
-            for capsule in &mut self.human.capsules[..self.human.capsule_count as usize] {
+            for capsule in self.human.capsules.iter_mut().take(self.human.capsule_count as usize) {
                 for end in &mut capsule.ends {
                     for (x, v) in end.iter_mut().zip(&capsule.velocity) {
                         *x += v * PERIOD;
@@ -273,16 +282,30 @@ impl Cell {
             Self::stamp(&mut self.task.header, self.now);
             Self::stamp(&mut self.scene.header, self.now);
         }
-        if let Some(tamper) = self.tamper {
-            tamper(&mut self.arm, &mut self.human, &mut self.scene, &mut self.task, self.cycle);
+    }
+
+    /// One millisecond: everyone publishes, the controller runs, the arm follows, the referee looks.
+    pub fn step(&mut self) {
+        self.prepare();
+        let (mut arm, mut human, mut scene, mut task) = (self.arm, self.human, self.scene, self.task);
+        if self.late > 0 {
+            self.past.push(human);
+            human = self.past[self.past.len().saturating_sub(1 + self.late as usize)];
         }
-        let inputs = ControllerInputs { arm: &self.arm, human: &self.human, scene: &self.scene, task: &self.task };
+        if self.blind {
+            human.capsule_count = 0;
+        }
+        if let Some(tamper) = self.tamper {
+            tamper(&mut arm, &mut human, &mut scene, &mut task, self.cycle);
+        }
+        let inputs = ControllerInputs { arm: &arm, human: &human, scene: &scene, task: &task };
         self.controller.cycle(self.now, &inputs, &mut self.outputs);
         self.judge();
         self.follow();
     }
 
-    fn follow(&mut self) {
+    /// The arm and its tool do as they are told.
+    pub fn follow(&mut self) {
         self.commands += 1;
         let command = &self.outputs.command;
         if command.brake == 1 {
@@ -341,7 +364,7 @@ impl Cell {
         self.last = [p2, p1, command.position];
         if self.moving() {
             let poses = self.chain.forward(&command.position);
-            let people = &self.human.capsules[..self.human.capsule_count as usize];
+            let people = &self.human.capsules[..(self.human.capsule_count as usize).min(16)];
             self.referee.set_human(people);
             let found = &mut self.findings;
             found.separation_moving_min = found.separation_moving_min.min(self.referee.separation(&poses).distance);
