@@ -99,9 +99,8 @@ impl Card {
         let bytes = std::fs::read(file).map_err(|source| ModelError::Missing { file: file.to_owned(), source })?;
         let card: Self =
             serde_json::from_slice(&bytes).map_err(|source| ModelError::Card { file: file.to_owned(), source })?;
-        let refuse = |field, found: String, allowed| {
-            Err(ModelError::Field { file: file.to_owned(), field, found, allowed })
-        };
+        let refuse =
+            |field, found: String, allowed| Err(ModelError::Field { file: file.to_owned(), field, found, allowed });
         if card.format != Self::FORMAT {
             return refuse("format", card.format.to_string(), "1");
         }

@@ -56,10 +56,10 @@ impl Grid {
         debug_assert!(radius <= 0.5 * WIDTH);
         let low = p.map(|v| axis(v - radius));
         let high = p.map(|v| axis(v + radius));
-        let cells = (low[0]..=high[0])
-            .flat_map(|x| (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| index([x, y, z]) as usize)));
-        let members =
-            cells.flat_map(|cell| &self.members[self.start[cell] as usize..self.start[cell + 1] as usize]);
+        let cells = (low[0]..=high[0]).flat_map(|x| {
+            (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| index([x, y, z]) as usize))
+        });
+        let members = cells.flat_map(|cell| &self.members[self.start[cell] as usize..self.start[cell + 1] as usize]);
         let near = members.map(|&i| sub(points[usize::from(i)], p)).filter(|d| squared(*d) < radius * radius);
         let (count, _, covariance) = moments(near);
         let back = 1.0 / squared(towards).sqrt().max(1e-9);

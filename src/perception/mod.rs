@@ -84,11 +84,15 @@ impl Perception {
             recognition: Code::of(Recognition::NoPart),
             ..Feature::default()
         };
-        let Some(points) = cloud.points.get(..cloud.point_count as usize) else { return };
+        let Some(points) = cloud.points.get(..cloud.point_count as usize) else {
+            return;
+        };
         if !cloud.base_from_camera.is_valid() || !sound(points) {
             return;
         }
-        let Some(recognised) = self.recognise(points) else { return };
+        let Some(recognised) = self.recognise(points) else {
+            return;
+        };
         let sure = f64::from(recognised.probabilities[recognised.class.code() as usize]) >= self.card().threshold;
         feature.recognition = Code::of(match recognised.fit {
             Some(_) if sure => Recognition::Sure,
@@ -109,7 +113,8 @@ impl Perception {
         let sample = self.sampler.sample(cloud)?;
         let answer = self.model.answer(&sample)?;
         let probabilities = self.model.probabilities(&answer.logits);
-        let best = (0..FEATURE_CLASSES).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))?;
+        let best =
+            (0..FEATURE_CLASSES).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))?;
         let class = *FeatureClass::ALL.iter().find(|class| class.code() as usize == best)?;
         let fit = fit(cloud, &sample, &answer.segment, class).filter(finite);
         let segment_count = answer.segment.iter().filter(|s| **s).count() as u32;

@@ -261,8 +261,7 @@ impl Network {
         let (training, batch) = (dropout.is_some(), input.batch);
         let embedded = self.embed[0].forward(&input.members, training)?;
         let embedded = self.embed[1].forward(&embedded, training)?;
-        let mut x =
-            embedded.reshape((batch * CENTRES, NEIGHBOURS, WIDTH))?.apply_op1(MaxOverMembers)?;
+        let mut x = embedded.reshape((batch * CENTRES, NEIGHBOURS, WIDTH))?.apply_op1(MaxOverMembers)?;
         let mut layers = vec![x.clone()];
         for attention in &self.attention {
             x = attention.forward(&x, &input.places, batch, training)?;

@@ -142,7 +142,8 @@ impl CustomOp3 for BatchNormRelu {
                 with_values(grad, |g| {
                     let rows = x.len() / channels;
                     let (mut dgain, mut dbias) = (vec![0.0_f32; channels], vec![0.0_f32; channels]);
-                    let triple = || x.chunks_exact(channels).zip(y.chunks_exact(channels)).zip(g.chunks_exact(channels));
+                    let triple =
+                        || x.chunks_exact(channels).zip(y.chunks_exact(channels)).zip(g.chunks_exact(channels));
                     for ((x, y), g) in triple() {
                         for c in 0..channels {
                             let live = if y[c] > 0.0 { g[c] } else { 0.0 };

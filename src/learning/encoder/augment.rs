@@ -40,7 +40,6 @@ pub(crate) fn augmented(example: &Example, rng: &mut ChaCha8Rng) -> Example {
 /// Zero for what is dropped, more than one for what is kept.
 pub(crate) fn dropout_mask(batch: usize, width: usize, rng: &mut ChaCha8Rng) -> Result<Tensor> {
     let keep = 1.0 / (1.0 - DROPOUT);
-    let mask: Vec<f32> =
-        (0..batch * width).map(|_| if rng.random::<f32>() < DROPOUT { 0.0 } else { keep }).collect();
+    let mask: Vec<f32> = (0..batch * width).map(|_| if rng.random::<f32>() < DROPOUT { 0.0 } else { keep }).collect();
     Tensor::from_vec(mask, (batch, width), &Device::Cpu)
 }

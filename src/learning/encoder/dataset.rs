@@ -41,13 +41,7 @@ pub struct Example {
 /// frame) is left in `cloud`.
 ///
 /// Draws again, from the same stream, when hardly anything of the part came into view.
-pub fn example(
-    seed: u64,
-    split: Split,
-    index: u64,
-    sampler: &mut Sampler,
-    cloud: &mut Vec<[f32; 3]>,
-) -> Example {
+pub fn example(seed: u64, split: Split, index: u64, sampler: &mut Sampler, cloud: &mut Vec<[f32; 3]>) -> Example {
     // One generator a seed and split, one stream an example: no two share numbers.
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(4).wrapping_add(split as u64));
     rng.set_stream(index);
@@ -62,7 +56,9 @@ pub fn example(
             cloud.push(p);
             materials.push(m);
         });
-        let Some(sample) = sampler.sample(cloud) else { continue };
+        let Some(sample) = sampler.sample(cloud) else {
+            continue;
+        };
         let segment: Vec<bool> =
             sample.source.iter().map(|&i| materials[usize::from(i)] == Material::Feature).collect();
         let shown = segment.iter().filter(|s| **s).count();

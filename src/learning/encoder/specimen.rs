@@ -65,11 +65,8 @@ impl Specimen {
 
         let half_width = size * log_uniform(VIEW, rng);
         let sigma = (half_width * log_uniform(NOISE, rng)).clamp(NOISE_LIMITS[0], NOISE_LIMITS[1]);
-        let camera = Camera {
-            range_sigma: sigma,
-            dropout: rng.random_range(0.0..0.08),
-            outliers: rng.random_range(0.0..0.008),
-        };
+        let camera =
+            Camera { range_sigma: sigma, dropout: rng.random_range(0.0..0.08), outliers: rng.random_range(0.0..0.008) };
         let (off, toward) = (0.4 * half_width * rng.random::<f64>().sqrt(), rng.random_range(0.0..TAU));
         let aim = [off * toward.cos(), off * toward.sin(), 0.0];
         let focus = rng.random_range(0.25..0.5);
@@ -110,7 +107,16 @@ fn log_uniform([low, high]: [f64; 2], rng: &mut ChaCha8Rng) -> f64 {
 }
 
 fn feature(class: FeatureClass, rng: &mut ChaCha8Rng) -> (FeatureGeometry, Form) {
-    let mut g = FeatureGeometry { class, diameter: 0.0, depth: 0.0, length: 0.0, width: 0.0, pitch: 0.0, angle: 0.0, chamfer: 0.0 };
+    let mut g = FeatureGeometry {
+        class,
+        diameter: 0.0,
+        depth: 0.0,
+        length: 0.0,
+        width: 0.0,
+        pitch: 0.0,
+        angle: 0.0,
+        chamfer: 0.0,
+    };
     let mut form = Form::default();
     let size = log_uniform(SIZE, rng);
     let of = |rng: &mut ChaCha8Rng, low: f64, high: f64| size * rng.random_range(low..high);
@@ -248,7 +254,12 @@ fn body(feature: &mut FeatureGeometry, size: f64, room: [f64; 2], rng: &mut ChaC
 
 /// The carrier of a part that lies on its side, and a view from above it: carrier pose in the
 /// feature frame, tilt and azimuth of the view.
-fn lying_on(body: &Body, part_from_feature: &Isometry3<f64>, size: f64, rng: &mut ChaCha8Rng) -> (Isometry3<f64>, f64, f64) {
+fn lying_on(
+    body: &Body,
+    part_from_feature: &Isometry3<f64>,
+    size: f64,
+    rng: &mut ChaCha8Rng,
+) -> (Isometry3<f64>, f64, f64) {
     let half = body.half_extents();
     // The side that looks down: against x or y of the part.
     let (side, up) = if rng.random_bool(0.5) { (0, Vector3::x()) } else { (1, Vector3::y()) };
@@ -275,7 +286,11 @@ fn stray(size: f64, half_width: f64, height: f64, rng: &mut ChaCha8Rng) -> Clutt
             let turn: f64 = rng.random_range(0.0..std::f64::consts::PI);
             Clutter::Box(f(centre), f(half), [turn.cos() as f32, turn.sin() as f32])
         }
-        2 => Clutter::Post(f(centre), (big * rng.random_range(0.3..0.9)) as f32, (big * rng.random_range(0.2..1.2)) as f32),
+        2 => Clutter::Post(
+            f(centre),
+            (big * rng.random_range(0.3..0.9)) as f32,
+            (big * rng.random_range(0.2..1.2)) as f32,
+        ),
         _ => {
             // A cable passes by at a tangent.
             let run = half_width * rng.random_range(0.5..2.0);

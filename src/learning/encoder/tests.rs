@@ -115,7 +115,9 @@ fn the_shipped_model_keeps_its_promise() {
     for index in 0..count {
         // A seed no training uses.
         let truth = example(0xf5e5, Split::Test, index, &mut sampler, &mut cloud);
-        let Some(answer) = perception.recognise(&cloud) else { continue };
+        let Some(answer) = perception.recognise(&cloud) else {
+            continue;
+        };
         let hit = answer.class == truth.class;
         right += u32::from(hit);
         if f64::from(answer.probabilities[answer.class.code() as usize]) >= perception.card().threshold {
@@ -177,7 +179,9 @@ fn foreign_models_are_refused() {
         card.weights_blake3 = blake3::hash(&std::fs::read(&file).expect("readable")).to_hex().to_string();
         card.write(&card_file).expect("writable");
         match Model::load(folder.path()) {
-            Err(error @ ModelError::Shape { .. }) => assert!(error.to_string().contains(name), "{error}"),
+            Err(error @ ModelError::Shape { .. }) => {
+                assert!(error.to_string().contains(name), "{error}")
+            }
             other => panic!("{other:?}"),
         }
     }
@@ -273,25 +277,61 @@ fn the_parts_of_the_s471_box_are_recognised() {
     use FeatureClass as C;
     let plate = |x, y, z| Body::Box { size: [x, y, z] };
     let parts = [
-        ("bottom shell", Body::Tray { size: [0.30, 0.40, 0.09], wall: 0.024, floor: 0.006 },
-            geometry(C::SmoothHole, [0.014, 0.030, 0.0, 0.0, 0.0, 0.0]), [0.138, 0.0, 0.045]),
-        ("sealing ring", Body::Ring { outer: [0.30, 0.40], inner: [0.252, 0.352], height: 0.010 },
-            geometry(C::Slot, [0.0, 0.005, 0.120, 0.008, 0.0, 0.0]), [0.138, 0.0, 0.005]),
-        ("battery module", plate(0.18, 0.28, 0.05),
-            geometry(C::SmoothAxis, [0.020, 0.030, 0.0, 0.0, 0.0, 0.0]), [0.0, 0.115, 0.025]),
-        ("heat guard plate", plate(0.18, 0.20, 0.006),
-            geometry(C::Slot, [0.0, 0.005, 0.060, 0.012, 0.0, 0.0]), [0.05, 0.0, 0.003]),
-        ("fireproof guard plate", plate(0.18, 0.20, 0.004),
-            geometry(C::Buckle, [0.0, 0.014, 0.030, 0.016, 0.0, 0.0]), [0.06, 0.0, 0.002]),
-        ("metal partition plate", plate(0.18, 0.18, 0.006),
-            geometry(C::SmoothHole, [0.018, 0.006, 0.0, 0.0, 0.0, 0.0]), [0.055, 0.055, 0.003]),
-        ("top cover", plate(0.30, 0.40, 0.016),
-            geometry(C::ThreadedHole, [0.016, 0.014, 0.0, 0.0, 0.002, 0.0]), [-0.07, 0.0, 0.008]),
-        ("fuse", Body::Cylinder { radius: 0.020, height: 0.024 },
-            geometry(C::ThreadedAxis, [0.014, 0.022, 0.0, 0.0, 0.002, 0.0]), [0.0, 0.0, 0.012]),
+        (
+            "bottom shell",
+            Body::Tray { size: [0.30, 0.40, 0.09], wall: 0.024, floor: 0.006 },
+            geometry(C::SmoothHole, [0.014, 0.030, 0.0, 0.0, 0.0, 0.0]),
+            [0.138, 0.0, 0.045],
+        ),
+        (
+            "sealing ring",
+            Body::Ring { outer: [0.30, 0.40], inner: [0.252, 0.352], height: 0.010 },
+            geometry(C::Slot, [0.0, 0.005, 0.120, 0.008, 0.0, 0.0]),
+            [0.138, 0.0, 0.005],
+        ),
+        (
+            "battery module",
+            plate(0.18, 0.28, 0.05),
+            geometry(C::SmoothAxis, [0.020, 0.030, 0.0, 0.0, 0.0, 0.0]),
+            [0.0, 0.115, 0.025],
+        ),
+        (
+            "heat guard plate",
+            plate(0.18, 0.20, 0.006),
+            geometry(C::Slot, [0.0, 0.005, 0.060, 0.012, 0.0, 0.0]),
+            [0.05, 0.0, 0.003],
+        ),
+        (
+            "fireproof guard plate",
+            plate(0.18, 0.20, 0.004),
+            geometry(C::Buckle, [0.0, 0.014, 0.030, 0.016, 0.0, 0.0]),
+            [0.06, 0.0, 0.002],
+        ),
+        (
+            "metal partition plate",
+            plate(0.18, 0.18, 0.006),
+            geometry(C::SmoothHole, [0.018, 0.006, 0.0, 0.0, 0.0, 0.0]),
+            [0.055, 0.055, 0.003],
+        ),
+        (
+            "top cover",
+            plate(0.30, 0.40, 0.016),
+            geometry(C::ThreadedHole, [0.016, 0.014, 0.0, 0.0, 0.002, 0.0]),
+            [-0.07, 0.0, 0.008],
+        ),
+        (
+            "fuse",
+            Body::Cylinder { radius: 0.020, height: 0.024 },
+            geometry(C::ThreadedAxis, [0.014, 0.022, 0.0, 0.0, 0.002, 0.0]),
+            [0.0, 0.0, 0.012],
+        ),
         ("protective film", plate(0.16, 0.34, 0.001), geometry(C::Other, [0.0; 6]), [0.0, 0.0, 0.0005]),
-        ("main cable", Body::Cable { length: 0.26, radius: 0.009 },
-            geometry(C::Cone, [0.030, 0.028, 0.0, 0.0, 0.0, 0.30]), [0.0, 0.13, 0.0]),
+        (
+            "main cable",
+            Body::Cable { length: 0.26, radius: 0.009 },
+            geometry(C::Cone, [0.030, 0.028, 0.0, 0.0, 0.0, 0.30]),
+            [0.0, 0.13, 0.0],
+        ),
     ];
     let mut perception = Perception::load(&shipped()).expect("the shipped model is sound");
     let mut right = 0;
@@ -299,7 +339,8 @@ fn the_parts_of_the_s471_box_are_recognised() {
     for (name, body, feature, at) in &parts {
         let cable = matches!(body, Body::Cable { .. });
         let lying = Vector3::new(-std::f64::consts::FRAC_PI_2, 0.0, 0.0);
-        let upright = if feature.class == C::Slot { Vector3::z() * std::f64::consts::FRAC_PI_2 } else { Vector3::zeros() };
+        let upright =
+            if feature.class == C::Slot { Vector3::z() * std::f64::consts::FRAC_PI_2 } else { Vector3::zeros() };
         let part_from_feature = Isometry3::new(Vector3::from(*at), if cable { lying } else { upright });
         let solid = Solid::new(body, feature, &part_from_feature);
         let down = if cable { 0.0155 } else { body.half_extents()[2] };

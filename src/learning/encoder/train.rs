@@ -269,5 +269,9 @@ impl Run {
 /// One-cycle schedule: the rate rises in a cosine to [`RATE`] and falls in another to nothing.
 fn rate(done: f32) -> f32 {
     let half_cosine = |t: f32| 0.5 - 0.5 * (std::f32::consts::PI * t).cos();
-    if done < WARM { RATE * (0.04 + 0.96 * half_cosine(done / WARM)) } else { RATE * half_cosine((1.0 - done) / (1.0 - WARM)) }
+    if done < WARM {
+        RATE * (0.04 + 0.96 * half_cosine(done / WARM))
+    } else {
+        RATE * half_cosine((1.0 - done) / (1.0 - WARM))
+    }
 }

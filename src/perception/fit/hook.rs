@@ -60,7 +60,6 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         depth: measured(top, plane.rms + 0.01 * top),
         ..FeatureDimensions::default()
     };
-    let pose =
-        frame.pose(Vector3::new(centre.x, centre.y, 0.0), Vector3::z(), Vector3::new(along.x, along.y, 0.0));
+    let pose = frame.pose(Vector3::new(centre.x, centre.y, 0.0), Vector3::z(), Vector3::new(along.x, along.y, 0.0));
     Some(Fit { camera_from_feature: pose, dimensions })
 }

@@ -39,11 +39,8 @@ pub(crate) fn surface(
     rng: &mut ChaCha8Rng,
 ) -> Option<Plane> {
     // In scaled units about the sample's centre, along the camera's axes.
-    let places: Vec<[f32; 3]> = sample
-        .source
-        .iter()
-        .map(|&i| sub(cloud[usize::from(i)], sample.centre).map(|v| v / sample.scale))
-        .collect();
+    let places: Vec<[f32; 3]> =
+        sample.source.iter().map(|&i| sub(cloud[usize::from(i)], sample.centre).map(|v| v / sample.scale)).collect();
     let normals: Vec<[f32; 3]> = (0..places.len()).map(|i| sample.normal_in_camera(i)).collect();
     let place = |i: usize| places[i];
     let feature: Vec<usize> = (0..segment.len()).filter(|&i| segment[i]).collect();
@@ -66,9 +63,9 @@ pub(crate) fn surface(
         let i = voters[rng.random_range(0..voters.len())].1;
         let normal = normals[i];
         let offset = dot(normal, place(i));
-        let votes = voters.iter().filter(|(_, j)| {
-            (dot(normal, place(*j)) - offset).abs() < BAND && dot(normal, normals[*j]) > ALIKE
-        });
+        let votes = voters
+            .iter()
+            .filter(|(_, j)| (dot(normal, place(*j)) - offset).abs() < BAND && dot(normal, normals[*j]) > ALIKE);
         let votes = votes.count();
         if best.is_none_or(|b| votes > b.0) {
             best = Some((votes, normal, offset));
@@ -88,7 +85,8 @@ pub(crate) fn surface(
     let near: Vec<Vector3<f64>> = dense.rest.iter().copied().filter(|p| (p - middle).norm() < reach).collect();
 
     let normal = wide(normal);
-    let mut plane = Plane { normal, offset: normal.dot(&wide(sample.centre)) + f64::from(offset * sample.scale), rms: 0.0 };
+    let mut plane =
+        Plane { normal, offset: normal.dot(&wide(sample.centre)) + f64::from(offset * sample.scale), rms: 0.0 };
     let mut band = f64::from(BAND * sample.scale);
     for _ in 0..4 {
         let on: Vec<Vector3<f64>> = near.iter().copied().filter(|p| plane.height(*p).abs() < band).collect();

@@ -57,13 +57,10 @@ pub(crate) fn fit(
     });
     // What stands out may stand on no surface that is seen: a plug at the end of a cable.
     let raised = !matches!(class, FeatureClass::ThreadedHole | FeatureClass::SmoothHole);
-    let by_normals = raised
-        .then(|| axis_of_normals(sample, segment, rng))
-        .flatten()
-        .and_then(|axis| {
-            let frame = Frame::on(middle, axis);
-            Some((frame, wall(&frame, dense, class, LEAN[1], rng)?))
-        });
+    let by_normals = raised.then(|| axis_of_normals(sample, segment, rng)).flatten().and_then(|axis| {
+        let frame = Frame::on(middle, axis);
+        Some((frame, wall(&frame, dense, class, LEAN[1], rng)?))
+    });
     let (frame, wall, on_surface) = match (by_surface, by_normals) {
         (Some((f, w)), Some((_, free))) if w.median <= 1.3 * free.median + 20e-6 => (f, w, true),
         (_, Some((f, w))) => (f, w, false),
@@ -111,8 +108,7 @@ fn wall(frame: &Frame, dense: &Dense, class: FeatureClass, lean: f64, rng: &mut 
     let (low, high) = (quantile(&mut heights, 0.03), quantile(&mut heights, 0.97));
     let span = high - low;
     // Floor, cap and chamfer are not wall.
-    let flank: Vec<Local> =
-        local.into_iter().filter(|p| p.z > low + 0.10 * span && p.z < high - 0.08 * span).collect();
+    let flank: Vec<Local> = local.into_iter().filter(|p| p.z > low + 0.10 * span && p.z < high - 0.08 * span).collect();
     if flank.len() < 10 {
         return None;
     }
@@ -137,12 +133,13 @@ fn guess(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<Wall> {
     for _ in 0..if cone { 3 * CIRCLES } else { CIRCLES } {
         let first = rng.random_range(0..=count - slice);
         let [a, b, c] = [0; 3].map(|_| voters[first + rng.random_range(0..slice)]);
-        let Some((centre, radius)) = through(a.xy(), b.xy(), c.xy()) else { continue };
+        let Some((centre, radius)) = through(a.xy(), b.xy(), c.xy()) else {
+            continue;
+        };
         if radius > 1.2 * widest || radius < 0.05 * widest {
             continue;
         }
-        let mut wall =
-            Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2], median: f64::MAX };
+        let mut wall = Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2], median: f64::MAX };
         if cone {
             let height = (a.z + b.z + c.z) / 3.0;
             let other = voters[rng.random_range(0..count)];
@@ -207,7 +204,9 @@ fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall
         }
         let rms = (squares / weight_sum).sqrt().max(10e-6);
         // Priors, in units of the measured noise.
-        for (k, prior, now) in [(2, lean, wall.lean.x), (3, lean, wall.lean.y), (5, if cone { 1.0 } else { 1e-6 }, wall.slope)] {
+        for (k, prior, now) in
+            [(2, lean, wall.lean.x), (3, lean, wall.lean.y), (5, if cone { 1.0 } else { 1e-6 }, wall.slope)]
+        {
             let stiffness = (rms / prior).powi(2);
             normal[(k, k)] += stiffness;
             right[k] -= stiffness * now;
@@ -222,7 +221,8 @@ fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall
         wall.median = quantile(&mut off_wall, 0.5);
         reach = (6.0 * wall.median).clamp(0.02 * start, reach);
     }
-    let sane = wall.radius > 0.1 * start && wall.radius < 6.0 * start && wall.lean.norm() < 1.0 && wall.slope.abs() < 2.0;
+    let sane =
+        wall.radius > 0.1 * start && wall.radius < 6.0 * start && wall.lean.norm() < 1.0 && wall.slope.abs() < 2.0;
     sane.then_some(wall)
 }
 

@@ -82,11 +82,7 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         depth: measured(depth, plane.rms + 0.02 * depth),
         ..FeatureDimensions::default()
     };
-    let pose = frame.pose(
-        Vector3::new(centre.x, centre.y, 0.0),
-        Vector3::z(),
-        Vector3::new(along.x, along.y, 0.0),
-    );
+    let pose = frame.pose(Vector3::new(centre.x, centre.y, 0.0), Vector3::z(), Vector3::new(along.x, along.y, 0.0));
     Some(Fit { camera_from_feature: pose, dimensions })
 }
 

@@ -55,17 +55,48 @@ pub struct FeatureSolid {
 enum Shape {
     /// Nothing: the bare surface.
     None,
-    Hole { radius: f32, depth: f32, chamfer: f32, thread: Option<Thread> },
-    Axis { radius: f32, height: f32, chamfer: f32, thread: Option<Thread> },
-    Slot { half_run: f32, radius: f32, depth: f32, chamfer: f32 },
+    Hole {
+        radius: f32,
+        depth: f32,
+        chamfer: f32,
+        thread: Option<Thread>,
+    },
+    Axis {
+        radius: f32,
+        height: f32,
+        chamfer: f32,
+        thread: Option<Thread>,
+    },
+    Slot {
+        half_run: f32,
+        radius: f32,
+        depth: f32,
+        chamfer: f32,
+    },
     /// Frustum: radius at z = 0, change of radius a metre of z, end of it, cosine of the half angle.
-    Cone { radius: f32, slope: f32, end: f32, cosine: f32 },
+    Cone {
+        radius: f32,
+        slope: f32,
+        end: f32,
+        cosine: f32,
+    },
     /// Hook profile in the plane (x, z), half width along y, half gap between two facing away, or none.
-    Buckle { profile: [[f32; 2]; 7], half_width: f32, half_gap: Option<f32>, reach: f32 },
+    Buckle {
+        profile: [[f32; 2]; 7],
+        half_width: f32,
+        half_gap: Option<f32>,
+        reach: f32,
+    },
     /// Box with rounded edges, standing on the surface.
-    Block { half: [f32; 3], rounding: f32 },
+    Block {
+        half: [f32; 3],
+        rounding: f32,
+    },
     /// Cap of a sphere with this radius and centre height.
-    Dome { radius: f32, centre: f32 },
+    Dome {
+        radius: f32,
+        centre: f32,
+    },
 }
 
 impl FeatureSolid {

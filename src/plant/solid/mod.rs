@@ -48,12 +48,7 @@ impl Solid {
     }
 
     /// The same with what the dimensions leave open.
-    pub fn with_form(
-        body: &Body,
-        feature: &FeatureGeometry,
-        form: &Form,
-        part_from_feature: &Isometry3<f64>,
-    ) -> Self {
+    pub fn with_form(body: &Body, feature: &FeatureGeometry, form: &Form, part_from_feature: &Isometry3<f64>) -> Self {
         Self {
             body: BodySolid::new(body, part_from_feature),
             feature: FeatureSolid::new(feature, form),
