@@ -1,5 +1,15 @@
-//! Tandem, the workcell controller.
+//! Tandem, a zero-copy realtime controller for human-robot assembly workcells.
+//!
+//! ARCHITECTURE.md says how the parts hang together; each module's first lines
+//! say what it decides and what never happens in it.
 
+pub mod cli;
+pub mod doctor;
 pub mod learning;
+pub mod live;
+pub mod lockstep;
 pub mod perception;
 pub mod plant;
+pub mod roles;
+pub mod strategy;
+pub mod supervisor;

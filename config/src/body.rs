@@ -79,26 +79,15 @@ impl Body {
     pub fn cuboids(&self) -> Vec<Cuboid> {
         match *self {
             Self::Tray { size, wall, floor } => {
-                let mut cuboids = frame(
-                    [size[0], size[1]],
-                    [size[0] - 2.0 * wall, size[1] - 2.0 * wall],
-                    size[2],
-                );
+                let mut cuboids = frame([size[0], size[1]], [size[0] - 2.0 * wall, size[1] - 2.0 * wall], size[2]);
                 cuboids.push(Cuboid {
                     centre: [0.0, 0.0, (floor - size[2]) / 2.0],
                     half_extents: [size[0] / 2.0, size[1] / 2.0, floor / 2.0],
                 });
                 cuboids
             }
-            Self::Ring {
-                outer,
-                inner,
-                height,
-            } => frame(outer, inner, height),
-            _ => vec![Cuboid {
-                centre: [0.0; 3],
-                half_extents: self.half_extents(),
-            }],
+            Self::Ring { outer, inner, height } => frame(outer, inner, height),
+            _ => vec![Cuboid { centre: [0.0; 3], half_extents: self.half_extents() }],
         }
     }
 
@@ -110,66 +99,32 @@ impl Body {
                 let size: [f64; 3] = table.numbers(&SIZE);
                 let (wall, floor) = (table.number(&WALL), table.number(&FLOOR));
                 if 2.0 * wall >= size[0].min(size[1]) {
-                    table.refuse(
-                        WALL.key,
-                        &format!("{wall} m"),
-                        "less than half of size_m",
-                        "make the walls thinner",
-                    );
+                    table.refuse(WALL.key, &format!("{wall} m"), "less than half of size_m", "make the walls thinner");
                 }
                 if floor >= size[2] {
-                    table.refuse(
-                        FLOOR.key,
-                        &format!("{floor} m"),
-                        "less than size_m[2]",
-                        "make the floor thinner",
-                    );
+                    table.refuse(FLOOR.key, &format!("{floor} m"), "less than size_m[2]", "make the floor thinner");
                 }
                 Self::Tray { size, wall, floor }
             }
             "ring" => {
                 let (outer, inner) = (table.numbers::<2>(&OUTER), table.numbers::<2>(&INNER));
                 if inner[0] >= outer[0] || inner[1] >= outer[1] {
-                    table.refuse(
-                        INNER.key,
-                        &format!("{inner:?} m"),
-                        "less than outer_m",
-                        "make the opening smaller",
-                    );
+                    table.refuse(INNER.key, &format!("{inner:?} m"), "less than outer_m", "make the opening smaller");
                 }
-                Self::Ring {
-                    outer,
-                    inner,
-                    height: table.number(&HEIGHT),
-                }
+                Self::Ring { outer, inner, height: table.number(&HEIGHT) }
             }
-            "cylinder" => Self::Cylinder {
-                radius: table.number(&RADIUS),
-                height: table.number(&HEIGHT),
-            },
+            "cylinder" => Self::Cylinder { radius: table.number(&RADIUS), height: table.number(&HEIGHT) },
             "cable" => {
                 let (length, radius) = (table.number(&LENGTH), table.number(&RADIUS));
                 if length <= 2.0 * radius {
-                    table.refuse(
-                        LENGTH.key,
-                        &format!("{length} m"),
-                        "more than 2 radius_m",
-                        "make the cable longer",
-                    );
+                    table.refuse(LENGTH.key, &format!("{length} m"), "more than 2 radius_m", "make the cable longer");
                 }
                 Self::Cable { length, radius }
             }
-            "box" => Self::Box {
-                size: table.numbers(&SIZE),
-            },
+            "box" => Self::Box { size: table.numbers(&SIZE) },
             other => {
                 if !other.is_empty() {
-                    table.refuse(
-                        "kind",
-                        &format!("\"{other}\""),
-                        kinds,
-                        "choose one of these names",
-                    );
+                    table.refuse("kind", &format!("\"{other}\""), kinds, "choose one of these names");
                 }
                 Self::Box { size: [0.01; 3] }
             }
@@ -185,14 +140,8 @@ fn frame(outer: [f64; 2], inner: [f64; 2], height: f64) -> Vec<Cuboid> {
         .into_iter()
         .flat_map(|side| {
             [
-                Cuboid {
-                    centre: [side * at[0], 0.0, 0.0],
-                    half_extents: [bar[0], outer[1] / 2.0, height / 2.0],
-                },
-                Cuboid {
-                    centre: [0.0, side * at[1], 0.0],
-                    half_extents: [inner[0] / 2.0, bar[1], height / 2.0],
-                },
+                Cuboid { centre: [side * at[0], 0.0, 0.0], half_extents: [bar[0], outer[1] / 2.0, height / 2.0] },
+                Cuboid { centre: [0.0, side * at[1], 0.0], half_extents: [inner[0] / 2.0, bar[1], height / 2.0] },
             ]
         })
         .collect()
@@ -233,10 +182,7 @@ impl FeatureGeometry {
         use FeatureClass as C;
         let class = table.named("class").unwrap_or(C::Other);
         let when = |has: bool, bound: &Bound| if has { table.number(bound) } else { 0.0 };
-        let round = matches!(
-            class,
-            C::ThreadedHole | C::SmoothHole | C::ThreadedAxis | C::SmoothAxis | C::Cone
-        );
+        let round = matches!(class, C::ThreadedHole | C::SmoothHole | C::ThreadedAxis | C::SmoothAxis | C::Cone);
         let long = matches!(class, C::Slot | C::Buckle);
         Self {
             class,
@@ -244,10 +190,7 @@ impl FeatureGeometry {
             depth: when(round || long, &CLASS_DEPTH),
             length: when(long, &CLASS_LENGTH),
             width: when(long, &CLASS_WIDTH),
-            pitch: when(
-                matches!(class, C::ThreadedHole | C::ThreadedAxis),
-                &CLASS_PITCH,
-            ),
+            pitch: when(matches!(class, C::ThreadedHole | C::ThreadedAxis), &CLASS_PITCH),
             angle: when(class == C::Cone, &CLASS_ANGLE),
             chamfer: table.number_or(&CLASS_CHAMFER, 0.0),
         }

@@ -26,13 +26,7 @@ pub struct Camera {
 
 impl Camera {
     pub(crate) fn read(layout: &Table<'_>) -> Self {
-        let mut out = Self {
-            distance: 0.4,
-            field_of_view: 0.8,
-            pixels: 160,
-            range_sigma: 0.0,
-            dropout: 0.0,
-        };
+        let mut out = Self { distance: 0.4, field_of_view: 0.8, pixels: 160, range_sigma: 0.0, dropout: 0.0 };
         let Some(table) = layout.table("camera") else {
             return out;
         };

@@ -1,16 +1,23 @@
 //! A cell: everything its files say, checked.
 
+use crate::controller;
 use crate::fault::Faults;
 use crate::human::Human;
 use crate::layout::Layout;
 use crate::perception::Perception;
 use crate::plant::Plant;
 use crate::product::{self, Product};
-use crate::read::{Reading, Table};
+use crate::read::{Bound, Reading, Table, bound};
+use crate::robot::{Robot, RobotOptions};
 use crate::strategy::{self, ReferenceRow, StrategyRow};
 use crate::supervisor::Supervisor;
 use crate::timing::{Realtime, Timing};
 use std::path::{Component, Path, PathBuf};
+use tandem_controller::Params;
+
+const HOME: Bound = bound("home_rad", "rad", -6.2832, 6.2832);
+const ACCELERATION: Bound = bound("acceleration_max_rad_s2", "rad/s2", 0.1, 100.0);
+const JERK: Bound = bound("jerk_max_rad_s3", "rad/s3", 1.0, 10_000.0);
 
 /// Where the strategy library and the journal are kept.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,8 +37,10 @@ pub struct Cell {
     pub file: PathBuf,
     /// Hash of all files read, blake3 cut to 64 bits: peers of another configuration are refused.
     pub hash: u64,
-    /// URDF of the arm.
-    pub robot_file: PathBuf,
+    /// The arm.
+    pub robot: Robot,
+    /// Limits and margins of the controller, with this cell's hash, period and resting configuration.
+    pub controller: Params,
     /// When each role runs.
     pub timing: Timing,
     /// What is asked of the operating system.
@@ -67,7 +76,12 @@ impl Cell {
         let cell = read(path, product, &reading);
         let (hash, faults) = reading.finish();
         match cell {
-            Some(cell) if faults.is_empty() => Ok(Self { hash, ..cell }),
+            Some(mut cell) if faults.is_empty() => {
+                cell.hash = hash;
+                cell.controller.config_hash = hash;
+                cell.controller.home = cell.robot.home;
+                Ok(cell)
+            }
             _ => Err(Faults::new(faults)),
         }
     }
@@ -82,6 +96,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     // Every part is read before any is missed, so that one pass reports all faults.
     let name = root.text("name");
     let timing = Timing::read(&root);
+    let controller = controller::read(&root, &timing);
     let realtime = Realtime::read(&root);
     let layout = Layout::read(&root);
     let human = Human::read(&root);
@@ -89,19 +104,12 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     let perception = Perception::read(&root, folder);
     let supervisor = Supervisor::read(&root);
     let store = read_store(&root);
-    let robot_file = root.text("robot").map(|file| beside(folder, &file));
-    let product = layout
-        .as_ref()
-        .and_then(|layout| read_product(&root, product, folder, layout, reading));
+    let robot = read_robot(&root, folder, reading);
+    let product = layout.as_ref().and_then(|layout| read_product(&root, product, folder, layout, reading));
     let (mut reference, mut strategies) = (Vec::new(), Vec::new());
     for file in root.texts("strategies") {
         let file = beside(folder, &file);
-        let asked = root.fault_at(
-            "strategies",
-            &format!("\"{}\"", file.display()),
-            "a strategy file",
-            "",
-        );
+        let asked = root.fault_at("strategies", &format!("\"{}\"", file.display()), "a strategy file", "");
         let Some(document) = reading.open(&file, Some(asked)) else {
             continue;
         };
@@ -113,24 +121,16 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         strategies.extend(strategy::read_strategies(&table));
     }
     if reference.is_empty() || strategies.is_empty() {
-        let found = format!(
-            "{} reference rows, {} strategies",
-            reference.len(),
-            strategies.len()
-        );
-        root.refuse(
-            "strategies",
-            &found,
-            "at least one of each",
-            "list the files of config/strategies",
-        );
+        let found = format!("{} reference rows, {} strategies", reference.len(), strategies.len());
+        root.refuse("strategies", &found, "at least one of each", "list the files of config/strategies");
     }
 
     Some(Cell {
         name: name?,
         file: path.to_owned(),
         hash: 0,
-        robot_file: robot_file?,
+        robot: robot?,
+        controller,
         timing,
         realtime,
         layout: layout?,
@@ -145,24 +145,51 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     })
 }
 
+/// The arm of the `[robot]` table: a URDF, and what the cell adds to it.
+fn read_robot(root: &Table<'_>, folder: &Path, reading: &Reading) -> Option<Robot> {
+    let table = root.table("robot")?;
+    let file = beside(folder, &table.text("urdf")?);
+    let list = |bound: &Bound| table.has(bound.key).then(|| table.list(bound));
+    let options = RobotOptions {
+        tcp: table.text_if("tcp"),
+        home: list(&HOME),
+        acceleration_max: list(&ACCELERATION),
+        jerk_max: list(&JERK),
+    };
+    let found = format!("\"{}\"", file.display());
+    let document = reading.open(&file, Some(table.fault_at("urdf", &found, "a URDF file", "")))?;
+    let robot = Robot::parse(&file, &document.text, &options).map_err(|faults| reading.note_all(faults)).ok()?;
+    let joints = robot.chain.joint_count();
+    for (key, list) in
+        [(HOME.key, &options.home), (ACCELERATION.key, &options.acceleration_max), (JERK.key, &options.jerk_max)]
+    {
+        if let Some(list) = list.as_ref().filter(|list| list.len() != joints) {
+            let found = format!("{} numbers", list.len());
+            table.refuse(key, &found, &format!("{joints} numbers"), "write one for each moving joint, base first");
+        }
+    }
+    for (index, joint) in robot.chain.joints().iter().enumerate() {
+        let Some(position) = options.home.as_ref().and_then(|home| home.get(index)) else { continue };
+        let (min, max) = (joint.position_min, joint.position_max);
+        if !(min..=max).contains(position) {
+            let allowed = format!("{min}..={max} rad");
+            let advice = "keep the resting configuration within the joint's limits";
+            table.refuse(HOME.key, &format!("{position} rad for {}", robot.joint_names[index]), &allowed, advice);
+        }
+    }
+    Some(robot)
+}
+
 fn read_store(root: &Table<'_>) -> Store {
     if !root.has("store") {
         return Store { url: None };
     }
     let url = root.table("store").and_then(|table| {
         let url = table.text_if("url")?;
-        if !["sqlite:", "mysql:", "mariadb:"]
-            .iter()
-            .any(|scheme| url.starts_with(scheme))
-        {
+        if !["sqlite:", "mysql:", "mariadb:"].iter().any(|scheme| url.starts_with(scheme)) {
             let scheme = url.split(':').next().unwrap_or_default();
             let advice = "write sqlite://FILE or mysql://USER@HOST/DATABASE";
-            table.refuse(
-                "url",
-                &format!("\"{scheme}:…\""),
-                "sqlite:, mysql: or mariadb:",
-                advice,
-            );
+            table.refuse("url", &format!("\"{scheme}:…\""), "sqlite:, mysql: or mariadb:", advice);
         }
         Some(url)
     });
@@ -176,20 +203,12 @@ fn read_product(
     layout: &Layout,
     reading: &Reading,
 ) -> Option<Product> {
-    let products = root
-        .text("products")
-        .map(|products| beside(folder, &products));
+    let products = root.text("products").map(|products| beside(folder, &products));
     let named = root.text("product");
     let name = chosen.map(str::to_owned).or(named)?;
-    let file = if name.ends_with(".toml") {
-        PathBuf::from(&name)
-    } else {
-        products?.join(format!("{name}.toml"))
-    };
+    let file = if name.ends_with(".toml") { PathBuf::from(&name) } else { products?.join(format!("{name}.toml")) };
     let found = format!("\"{name}\"");
-    let asked = chosen
-        .is_none()
-        .then(|| root.fault_at("product", &found, "a product of the products folder", ""));
+    let asked = chosen.is_none().then(|| root.fault_at("product", &found, "a product of the products folder", ""));
     let document = reading.open(&file, asked)?;
     let parsed = document.parse(reading);
     let table = document.root(reading, &parsed);
@@ -197,10 +216,7 @@ fn read_product(
     let properties = table.text("properties").and_then(|properties| {
         let properties = beside(folder, &properties);
         let found = format!("\"{}\"", properties.display());
-        reading.open(
-            &properties,
-            Some(table.fault_at("properties", &found, "a JSON file", "")),
-        )
+        reading.open(&properties, Some(table.fault_at("properties", &found, "a JSON file", "")))
     });
     Some(product::read(&table, properties.as_ref(), layout, reading))
 }
@@ -210,9 +226,7 @@ pub(crate) fn beside(folder: &Path, written: &str) -> PathBuf {
     let mut out = PathBuf::new();
     for component in folder.join(written).components() {
         match component {
-            Component::ParentDir
-                if matches!(out.components().next_back(), Some(Component::Normal(_))) =>
-            {
+            Component::ParentDir if matches!(out.components().next_back(), Some(Component::Normal(_))) => {
                 out.pop();
             }
             Component::CurDir => {}

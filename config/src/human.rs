@@ -49,11 +49,7 @@ impl Human {
     /// Where the shoulder is when they work at the bench, metres, base frame: the
     /// point from which Eq. (1) measures the distance to a part.
     pub fn working_shoulder(&self) -> [f64; 3] {
-        [
-            self.work[0],
-            self.work[1],
-            self.work[2] + self.shoulder_height,
-        ]
+        [self.work[0], self.work[1], self.work[2] + self.shoulder_height]
     }
 
     pub(crate) fn read(cell: &Table<'_>) -> Option<Self> {

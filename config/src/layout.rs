@@ -41,19 +41,9 @@ pub struct FixedObject {
 
 impl FixedObject {
     /// A box whose top face has its centre at `base_from_top`.
-    fn below(
-        name: String,
-        id: u32,
-        half_extents: [f64; 3],
-        base_from_top: &Isometry3<f64>,
-    ) -> Self {
+    fn below(name: String, id: u32, half_extents: [f64; 3], base_from_top: &Isometry3<f64>) -> Self {
         let base_from_object = base_from_top * Translation3::new(0.0, 0.0, -half_extents[2]);
-        Self {
-            name,
-            id,
-            half_extents,
-            base_from_object,
-        }
+        Self { name, id, half_extents, base_from_object }
     }
 
     /// The object as it stands in a scene.
@@ -137,9 +127,7 @@ impl Layout {
 
     /// Index of the station of that name.
     pub fn station(&self, name: &str) -> Option<usize> {
-        self.stations
-            .iter()
-            .position(|station| station.name == name)
+        self.stations.iter().position(|station| station.name == name)
     }
 
     pub(crate) fn read(cell: &Table<'_>) -> Option<Self> {
@@ -150,12 +138,7 @@ impl Layout {
         for object in table.tables("object") {
             let name = object.text("name").unwrap_or_default();
             if fixed.iter().any(|known| known.name == name) {
-                object.refuse(
-                    "name",
-                    &format!("\"{name}\""),
-                    "a name used once",
-                    "give each object its own name",
-                );
+                object.refuse("name", &format!("\"{name}\""), "a name used once", "give each object its own name");
             }
             fixed.push(FixedObject {
                 name,
@@ -166,43 +149,23 @@ impl Layout {
         }
         if fixed.len() > 12 {
             let found = format!("{} objects", fixed.len());
-            table.refuse(
-                "object",
-                &found,
-                "at most 12 objects",
-                "join neighbouring objects into one box",
-            );
+            table.refuse("object", &found, "at most 12 objects", "join neighbouring objects into one box");
         }
 
         let fixture = table.table("fixture")?;
         let base_from_fixture = fixture.own_pose();
-        let fixture = FixedObject::below(
-            "fixture".into(),
-            id::FIXTURE,
-            half(&fixture),
-            &base_from_fixture,
-        );
+        let fixture = FixedObject::below("fixture".into(), id::FIXTURE, half(&fixture), &base_from_fixture);
 
         let mut stations: Vec<Station> = Vec::new();
         for station in table.tables("station") {
             let name = station.text("name").unwrap_or_default();
             if stations.iter().any(|known| known.name == name) {
-                station.refuse(
-                    "name",
-                    &format!("\"{name}\""),
-                    "a name used once",
-                    "give each station its own name",
-                );
+                station.refuse("name", &format!("\"{name}\""), "a name used once", "give each station its own name");
             }
             let base_from_station = station.own_pose();
             let carrier_id = id::STATION + stations.len() as u32;
-            let carrier =
-                FixedObject::below(name.clone(), carrier_id, half(&station), &base_from_station);
-            stations.push(Station {
-                name,
-                base_from_station,
-                carrier,
-            });
+            let carrier = FixedObject::below(name.clone(), carrier_id, half(&station), &base_from_station);
+            stations.push(Station { name, base_from_station, carrier });
         }
         if stations.is_empty() || stations.len() > 8 {
             let found = format!("{} stations", stations.len());
@@ -215,12 +178,7 @@ impl Layout {
         }
 
         let rack_table = table.table("rack")?;
-        let rack = FixedObject::below(
-            "rack".into(),
-            id::RACK,
-            half(&rack_table),
-            &rack_table.own_pose(),
-        );
+        let rack = FixedObject::below("rack".into(), id::RACK, half(&rack_table), &rack_table.own_pose());
         let rack_approach = rack_table.number(&ABOVE);
         let mut rack_slots: Vec<RackSlot> = Vec::new();
         for slot in rack_table.tables("slot") {
@@ -229,27 +187,14 @@ impl Layout {
             };
             if tool == Tool::None || rack_slots.iter().any(|known| known.tool == tool) {
                 let found = format!("\"{tool}\"");
-                slot.refuse(
-                    "tool",
-                    &found,
-                    "each of the four tools once",
-                    "give each tool one place",
-                );
+                slot.refuse("tool", &found, "each of the four tools once", "give each tool one place");
             }
-            rack_slots.push(RackSlot {
-                tool,
-                base_from_tcp: slot.own_pose(),
-            });
+            rack_slots.push(RackSlot { tool, base_from_tcp: slot.own_pose() });
         }
         for &tool in Tool::ALL.iter().filter(|tool| **tool != Tool::None) {
             if !rack_slots.iter().any(|slot| slot.tool == tool) {
                 let found = format!("no place for {tool}");
-                rack_table.refuse(
-                    "slot",
-                    &found,
-                    "each of the four tools once",
-                    "add a [[layout.rack.slot]] for it",
-                );
+                rack_table.refuse("slot", &found, "each of the four tools once", "add a [[layout.rack.slot]] for it");
             }
         }
 

@@ -14,6 +14,7 @@
 mod body;
 mod camera;
 mod cell;
+mod controller;
 mod fault;
 mod human;
 mod layout;
@@ -22,6 +23,7 @@ mod plant;
 mod pose;
 mod product;
 mod read;
+mod robot;
 mod strategy;
 mod supervisor;
 mod timing;
@@ -36,8 +38,7 @@ pub use perception::Perception;
 pub use plant::Plant;
 pub use pose::{isometry_of, pose_of};
 pub use product::{Capture, Part, Product};
-pub use strategy::{
-    AssemblyMode, Focus, Form, Range, ReferenceRow, Step, StrategyRow, Subject, Verb,
-};
+pub use robot::{LinkInertia, Robot, RobotOptions};
+pub use strategy::{AssemblyMode, Focus, Form, Range, ReferenceRow, Step, StrategyRow, Subject, Verb};
 pub use supervisor::{Capability, Supervisor, Timeouts};
 pub use timing::{Policy, Realtime, Schedule, Timing};

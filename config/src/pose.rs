@@ -7,10 +7,7 @@ use tandem_msg::Pose;
 pub fn pose_of(a_from_b: &Isometry3<f64>) -> Pose {
     let t = a_from_b.translation.vector;
     let q = a_from_b.rotation.quaternion().coords;
-    Pose {
-        position: [t.x, t.y, t.z],
-        rotation: [q.x, q.y, q.z, q.w],
-    }
+    Pose { position: [t.x, t.y, t.z], rotation: [q.x, q.y, q.z, q.w] }
 }
 
 /// The isometry of a pose, or `None` when it is not [`Pose::is_valid`].

@@ -75,10 +75,7 @@ impl Part {
     /// Where the camera stands to look at the feature from `distance` metres; z along the view.
     pub fn part_from_camera(&self, distance: f64) -> Isometry3<f64> {
         let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.view_turn);
-        let tilt = UnitQuaternion::from_axis_angle(
-            &Vector3::x_axis(),
-            std::f64::consts::PI - self.view_tilt,
-        );
+        let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI - self.view_tilt);
         self.part_from_feature * turn * tilt * Translation3::new(0.0, 0.0, -distance)
     }
 }
@@ -127,12 +124,7 @@ fn read_properties(document: &Document, reading: &Reading) -> BTreeMap<String, P
 }
 
 /// Reads `root` as a product made in `layout`, with the properties beside it.
-pub(crate) fn read(
-    root: &Table<'_>,
-    properties: Option<&Document>,
-    layout: &Layout,
-    reading: &Reading,
-) -> Product {
+pub(crate) fn read(root: &Table<'_>, properties: Option<&Document>, layout: &Layout, reading: &Reading) -> Product {
     let known = properties.map(|document| (document, read_properties(document, reading)));
     let mut product = Product {
         name: root.text("name").unwrap_or_default(),
@@ -142,34 +134,19 @@ pub(crate) fn read(
     let tables = root.tables("part");
     if tables.is_empty() || tables.len() > PARTS_MAX {
         let found = format!("{} parts", tables.len());
-        root.refuse(
-            "part",
-            &found,
-            &format!("1..={PARTS_MAX} parts"),
-            "write one [[part]] a part type",
-        );
+        root.refuse("part", &found, &format!("1..={PARTS_MAX} parts"), "write one [[part]] a part type");
     }
     let mut afters = Vec::new();
     for table in &tables {
         let mut part = read_part(table, layout);
         if product.part(&part.name).is_some() {
-            table.refuse(
-                "name",
-                &format!("\"{}\"", part.name),
-                "a name used once",
-                "give each part its own name",
-            );
+            table.refuse("name", &format!("\"{}\"", part.name), "a name used once", "give each part its own name");
         }
         if let Some((document, entries)) = &known {
             match entries.get(&part.name) {
                 Some(entry) => (part.oily, part.harmful) = (entry.oily, entry.harmful),
                 None if entries.is_empty() => {}
-                None => reading.note(whole_file(
-                    document,
-                    &part.name,
-                    "missing",
-                    "say whether it is oily and harmful",
-                )),
+                None => reading.note(whole_file(document, &part.name, "missing", "say whether it is oily and harmful")),
             }
         }
         afters.push(table.texts("after"));
@@ -177,12 +154,7 @@ pub(crate) fn read(
     }
     if let Some((document, entries)) = &known {
         for name in entries.keys().filter(|name| product.part(name).is_none()) {
-            reading.note(whole_file(
-                document,
-                name,
-                "unknown",
-                "remove it, or add the part to the product",
-            ));
+            reading.note(whole_file(document, name, "unknown", "remove it, or add the part to the product"));
         }
     }
     order(&mut product, &tables, &afters);
@@ -205,48 +177,23 @@ fn read_part(table: &Table<'_>, layout: &Layout) -> Part {
     let station_name = table.text("station").unwrap_or_default();
     let station = layout.station(&station_name).unwrap_or_else(|| {
         if !station_name.is_empty() {
-            let names: Vec<_> = layout
-                .stations
-                .iter()
-                .map(|station| station.name.as_str())
-                .collect();
+            let names: Vec<_> = layout.stations.iter().map(|station| station.name.as_str()).collect();
             let found = format!("\"{station_name}\"");
-            table.refuse(
-                "station",
-                &found,
-                &names.join(", "),
-                "name a station of the cell",
-            );
+            table.refuse("station", &found, &names.join(", "), "name a station of the cell");
         }
         0
     });
     let body_table = table.table("body");
-    let body = body_table
-        .as_ref()
-        .map_or(Body::Box { size: [0.01; 3] }, Body::read);
+    let body = body_table.as_ref().map_or(Body::Box { size: [0.01; 3] }, Body::read);
     let feature_table = table.table("feature");
-    let feature = feature_table
-        .as_ref()
-        .map_or_else(placeholder_feature, FeatureGeometry::read);
-    let (view_tilt, view_turn) = feature_table.as_ref().map_or((0.0, 0.0), |table| {
-        (table.number_or(&TILT, 0.0), table.number_or(&TURN, 0.0))
-    });
-    let part_from_feature = feature_table
-        .as_ref()
-        .map_or_else(Isometry3::identity, |table| table.pose("pose"));
+    let feature = feature_table.as_ref().map_or_else(placeholder_feature, FeatureGeometry::read);
+    let (view_tilt, view_turn) =
+        feature_table.as_ref().map_or((0.0, 0.0), |table| (table.number_or(&TILT, 0.0), table.number_or(&TURN, 0.0)));
+    let part_from_feature = feature_table.as_ref().map_or_else(Isometry3::identity, |table| table.pose("pose"));
     let name = table.text("name").unwrap_or_default();
-    if name
-        .chars()
-        .any(|c| !c.is_ascii_lowercase() && !c.is_ascii_digit() && c != '_')
-        || name.len() > 48
-    {
+    if name.chars().any(|c| !c.is_ascii_lowercase() && !c.is_ascii_digit() && c != '_') || name.len() > 48 {
         let allowed = "at most 48 of a-z, 0-9, _";
-        table.refuse(
-            "name",
-            &format!("\"{name}\""),
-            allowed,
-            "names are database keys: keep them plain",
-        );
+        table.refuse("name", &format!("\"{name}\""), allowed, "names are database keys: keep them plain");
     }
     let capture = table.table("capture");
     Part {
@@ -266,12 +213,8 @@ fn read_part(table: &Table<'_>, layout: &Layout) -> Part {
         fixture_from_part: table.pose("fixture_from_part"),
         grasp_width: table.number(&GRASP_WIDTH),
         capture: Capture {
-            position: capture
-                .as_ref()
-                .map_or(0.005, |table| table.number(&CAPTURE)),
-            angle: capture
-                .as_ref()
-                .map_or(0.07, |table| table.number(&CAPTURE_TURN)),
+            position: capture.as_ref().map_or(0.005, |table| table.number(&CAPTURE)),
+            angle: capture.as_ref().map_or(0.07, |table| table.number(&CAPTURE_TURN)),
         },
         view_tilt,
         view_turn,
@@ -303,11 +246,7 @@ fn order(product: &mut Product, tables: &[Table<'_>], afters: &[Vec<String>]) {
             match product.part(name) {
                 Some(before) => resolved.push(before),
                 None => {
-                    let known: Vec<_> = product
-                        .parts
-                        .iter()
-                        .map(|part| part.name.as_str())
-                        .collect();
+                    let known: Vec<_> = product.parts.iter().map(|part| part.name.as_str()).collect();
                     tables[index].refuse(
                         "after",
                         &format!("\"{name}\""),
@@ -321,24 +260,12 @@ fn order(product: &mut Product, tables: &[Table<'_>], afters: &[Vec<String>]) {
     }
     let mut sequence: Vec<usize> = Vec::new();
     while sequence.len() < count {
-        let ready = |index: &usize| {
-            !sequence.contains(index) && edges[*index].iter().all(|b| sequence.contains(b))
-        };
+        let ready = |index: &usize| !sequence.contains(index) && edges[*index].iter().all(|b| sequence.contains(b));
         let Some(next) = (0..count).find(ready) else {
-            let left: Vec<usize> = (0..count)
-                .filter(|index| !sequence.contains(index))
-                .collect();
-            let names: Vec<_> = left
-                .iter()
-                .map(|index| product.parts[*index].name.as_str())
-                .collect();
+            let left: Vec<usize> = (0..count).filter(|index| !sequence.contains(index)).collect();
+            let names: Vec<_> = left.iter().map(|index| product.parts[*index].name.as_str()).collect();
             let found = format!("a circle among {}", names.join(", "));
-            tables[left[0]].refuse(
-                "after",
-                &found,
-                "an order without circles",
-                "remove one `after` of the circle",
-            );
+            tables[left[0]].refuse("after", &found, "an order without circles", "remove one `after` of the circle");
             return;
         };
         sequence.push(next);
@@ -347,12 +274,8 @@ fn order(product: &mut Product, tables: &[Table<'_>], afters: &[Vec<String>]) {
     for (part, edges) in product.parts.iter_mut().zip(&edges) {
         part.after = edges.iter().map(|before| rank(*before)).collect();
     }
-    let mut ordered: Vec<(usize, Part)> = product
-        .parts
-        .drain(..)
-        .enumerate()
-        .map(|(i, part)| (rank(i), part))
-        .collect();
+    let mut ordered: Vec<(usize, Part)> =
+        product.parts.drain(..).enumerate().map(|(i, part)| (rank(i), part)).collect();
     ordered.sort_by_key(|(rank, _)| *rank);
     product.parts = ordered.into_iter().map(|(_, part)| part).collect();
 }

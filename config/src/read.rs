@@ -29,21 +29,12 @@ pub(crate) struct Bound {
 
 /// Declares a [`Bound`].
 pub(crate) const fn bound(key: &'static str, unit: &'static str, min: f64, max: f64) -> Bound {
-    Bound {
-        key,
-        unit,
-        min,
-        max,
-    }
+    Bound { key, unit, min, max }
 }
 
 impl Bound {
     fn with_unit(&self, text: &str) -> String {
-        if self.unit.is_empty() {
-            text.to_owned()
-        } else {
-            format!("{text} {}", self.unit)
-        }
+        if self.unit.is_empty() { text.to_owned() } else { format!("{text} {}", self.unit) }
     }
 
     fn allowed(&self) -> String {
@@ -67,10 +58,7 @@ pub(crate) struct Document {
 
 impl Reading {
     pub(crate) fn new() -> Self {
-        Self {
-            faults: RefCell::default(),
-            hasher: RefCell::new(blake3::Hasher::new()),
-        }
+        Self { faults: RefCell::default(), hasher: RefCell::new(blake3::Hasher::new()) }
     }
 
     /// Reads a file and folds it into the hash. `None` and a fault when it cannot be
@@ -82,10 +70,7 @@ impl Reading {
                 hasher.update(&(bytes.len() as u64).to_le_bytes());
                 hasher.update(&bytes);
                 match String::from_utf8(bytes) {
-                    Ok(text) => Some(Document {
-                        file: path.display().to_string(),
-                        text,
-                    }),
+                    Ok(text) => Some(Document { file: path.display().to_string(), text }),
                     Err(_) => {
                         self.note(Fault {
                             file: path.display().to_string(),
@@ -131,19 +116,10 @@ impl Reading {
         self.faults.borrow_mut().extend(faults);
     }
 
-    /// Folds bytes that belong to the cell but were read elsewhere into the hash.
-    pub(crate) fn fold(&self, bytes: &[u8]) {
-        let mut hasher = self.hasher.borrow_mut();
-        hasher.update(&(bytes.len() as u64).to_le_bytes());
-        hasher.update(bytes);
-    }
-
     /// The hash over all files read, and all faults found.
     pub(crate) fn finish(self) -> (u64, Vec<Fault>) {
         let hash = *self.hasher.into_inner().finalize().as_bytes();
-        let first = [
-            hash[0], hash[1], hash[2], hash[3], hash[4], hash[5], hash[6], hash[7],
-        ];
+        let first = [hash[0], hash[1], hash[2], hash[3], hash[4], hash[5], hash[6], hash[7]];
         (u64::from_le_bytes(first), self.faults.into_inner())
     }
 }
@@ -168,11 +144,7 @@ impl Document {
     }
 
     /// The table at the root of a parsed document.
-    pub(crate) fn root<'d>(
-        &'d self,
-        reading: &'d Reading,
-        parsed: &'d Spanned<DeTable<'d>>,
-    ) -> Table<'d> {
+    pub(crate) fn root<'d>(&'d self, reading: &'d Reading, parsed: &'d Spanned<DeTable<'d>>) -> Table<'d> {
         Table {
             reading,
             document: self,
@@ -187,10 +159,7 @@ impl Document {
     fn place(&self, offset: usize) -> (usize, usize) {
         let before = &self.text[..self.text.floor_char_boundary(offset)];
         let line_start = before.rfind('\n').map_or(0, |at| at + 1);
-        (
-            before.matches('\n').count() + 1,
-            before[line_start..].chars().count() + 1,
-        )
+        (before.matches('\n').count() + 1, before[line_start..].chars().count() + 1)
     }
 }
 
@@ -206,11 +175,7 @@ pub(crate) struct Table<'d> {
 
 impl<'d> Table<'d> {
     fn field(&self, key: &str) -> String {
-        if self.path.is_empty() {
-            key.to_owned()
-        } else {
-            format!("{}.{key}", self.path)
-        }
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
     }
 
     fn take(&self, key: &str) -> Option<&'d Spanned<DeValue<'d>>> {
@@ -224,14 +189,7 @@ impl<'d> Table<'d> {
         self.entries.contains_key(key)
     }
 
-    fn fault_in(
-        &self,
-        span: Range<usize>,
-        field: String,
-        found: String,
-        allowed: &str,
-        advice: &str,
-    ) -> Fault {
+    fn fault_in(&self, span: Range<usize>, field: String, found: String, allowed: &str, advice: &str) -> Fault {
         let (line, column) = self.document.place(span.start);
         Fault {
             file: self.document.file.clone(),
@@ -246,17 +204,13 @@ impl<'d> Table<'d> {
 
     /// A fault at the value of `key` (or at the table when it is absent), not yet noted.
     pub(crate) fn fault_at(&self, key: &str, found: &str, allowed: &str, advice: &str) -> Fault {
-        let span = self
-            .entries
-            .get(key)
-            .map_or(self.start..self.start, Spanned::span);
+        let span = self.entries.get(key).map_or(self.start..self.start, Spanned::span);
         self.fault_in(span, self.field(key), found.to_owned(), allowed, advice)
     }
 
     /// Notes a fault at the value of `key`.
     pub(crate) fn refuse(&self, key: &str, found: &str, allowed: &str, advice: &str) {
-        self.reading
-            .note(self.fault_at(key, found, allowed, advice));
+        self.reading.note(self.fault_at(key, found, allowed, advice));
     }
 
     fn missing(&self, key: &str, allowed: &str) {
@@ -265,39 +219,19 @@ impl<'d> Table<'d> {
 
     fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'_>>, wanted: &str) {
         let found = format!("a {}", value.get_ref().type_str());
-        self.reading.note(self.fault_in(
-            value.span(),
-            self.field(key),
-            found,
-            wanted,
-            "write it as that",
-        ));
+        self.reading.note(self.fault_in(value.span(), self.field(key), found, wanted, "write it as that"));
     }
 
     fn check(&self, bound: &Bound, field: String, value: &Spanned<DeValue<'_>>) -> f64 {
         let (number, text) = match value.get_ref() {
-            DeValue::Float(float) => (
-                float.as_str().replace('_', "").parse::<f64>().ok(),
-                float.to_string(),
-            ),
+            DeValue::Float(float) => (float.as_str().replace('_', "").parse::<f64>().ok(), float.to_string()),
             DeValue::Integer(integer) => {
                 let digits = integer.as_str().replace('_', "");
-                (
-                    i64::from_str_radix(&digits, integer.radix())
-                        .ok()
-                        .map(|n| n as f64),
-                    integer.to_string(),
-                )
+                (i64::from_str_radix(&digits, integer.radix()).ok().map(|n| n as f64), integer.to_string())
             }
             other => {
                 let found = format!("a {}", other.type_str());
-                let fault = self.fault_in(
-                    value.span(),
-                    field,
-                    found,
-                    &bound.allowed(),
-                    "write a number",
-                );
+                let fault = self.fault_in(value.span(), field, found, &bound.allowed(), "write a number");
                 self.reading.note(fault);
                 return bound.min;
             }
@@ -307,13 +241,7 @@ impl<'d> Table<'d> {
             _ => {
                 let advice = "choose a value within these bounds";
                 let found = bound.with_unit(&text);
-                self.reading.note(self.fault_in(
-                    value.span(),
-                    field,
-                    found,
-                    &bound.allowed(),
-                    advice,
-                ));
+                self.reading.note(self.fault_in(value.span(), field, found, &bound.allowed(), advice));
                 bound.min
             }
         }
@@ -332,23 +260,14 @@ impl<'d> Table<'d> {
 
     /// As [`Table::number`], or `absent` when the key does not stand there.
     pub(crate) fn number_or(&self, bound: &Bound, absent: f64) -> f64 {
-        if self.has(bound.key) {
-            self.number(bound)
-        } else {
-            absent
-        }
+        if self.has(bound.key) { self.number(bound) } else { absent }
     }
 
     /// A whole number within its bounds.
     pub(crate) fn whole(&self, bound: &Bound) -> u32 {
         let number = self.number(bound);
         if number.fract() != 0.0 {
-            self.refuse(
-                bound.key,
-                &bound.with_unit(&number.to_string()),
-                "whole numbers",
-                "drop the fraction",
-            );
+            self.refuse(bound.key, &bound.with_unit(&number.to_string()), "whole numbers", "drop the fraction");
         }
         number as u32
     }
@@ -364,8 +283,7 @@ impl<'d> Table<'d> {
             Some(array) if array.len() == N => {
                 let mut out = [bound.min; N];
                 for (index, item) in array.iter().enumerate() {
-                    out[index] =
-                        self.check(bound, format!("{}[{index}]", self.field(bound.key)), item);
+                    out[index] = self.check(bound, format!("{}[{index}]", self.field(bound.key)), item);
                 }
                 out
             }
@@ -379,6 +297,17 @@ impl<'d> Table<'d> {
                 [bound.min; N]
             }
         }
+    }
+
+    /// As many numbers as stand there, each within the same bounds.
+    pub(crate) fn list(&self, bound: &Bound) -> Vec<f64> {
+        let Some(value) = self.take(bound.key) else { return Vec::new() };
+        let Some(array) = value.get_ref().as_array() else {
+            self.wrong_type(bound.key, value, &format!("numbers, each {}", bound.allowed()));
+            return Vec::new();
+        };
+        let item = |(index, item)| self.check(bound, format!("{}[{index}]", self.field(bound.key)), item);
+        array.iter().enumerate().map(item).collect()
     }
 
     /// A text that is not empty.
@@ -444,12 +373,7 @@ impl<'d> Table<'d> {
         let found = T::named(&text);
         if found.is_none() {
             let names: Vec<_> = T::ALL.iter().map(|variant| variant.name()).collect();
-            self.refuse(
-                key,
-                &format!("\"{text}\""),
-                &names.join(", "),
-                "choose one of these names",
-            );
+            self.refuse(key, &format!("\"{text}\""), &names.join(", "), "choose one of these names");
         }
         found
     }
@@ -504,8 +428,7 @@ impl<'d> Table<'d> {
 
     /// A pose: `position_m` and, when it is turned, `rpy_rad` (fixed-axis roll, pitch, yaw).
     pub(crate) fn pose(&self, key: &str) -> Isometry3<f64> {
-        self.table(key)
-            .map_or_else(Isometry3::identity, |table| table.own_pose())
+        self.table(key).map_or_else(Isometry3::identity, |table| table.own_pose())
     }
 
     /// The pose whose numbers stand directly in this table.
@@ -513,23 +436,13 @@ impl<'d> Table<'d> {
         const POSITION: Bound = bound("position_m", "m", -5.0, 5.0);
         const TURN: Bound = bound("rpy_rad", "rad", -6.2832, 6.2832);
         let position: [f64; 3] = self.numbers(&POSITION);
-        let [roll, pitch, yaw] = if self.has(TURN.key) {
-            self.numbers(&TURN)
-        } else {
-            [0.0; 3]
-        };
-        Isometry3::from_parts(
-            Translation3::from(position),
-            UnitQuaternion::from_euler_angles(roll, pitch, yaw),
-        )
+        let [roll, pitch, yaw] = if self.has(TURN.key) { self.numbers(&TURN) } else { [0.0; 3] };
+        Isometry3::from_parts(Translation3::from(position), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
     }
 
-    /// Keys in the order of the file's table, for tables whose keys are names.
-    pub(crate) fn keys(&self) -> Vec<String> {
-        self.entries
-            .keys()
-            .map(|key| key.get_ref().to_string())
-            .collect()
+    /// The key of this table that begins with `stem`.
+    pub(crate) fn key_beginning_with(&self, stem: &str) -> Option<String> {
+        self.entries.keys().map(|key| key.get_ref().to_string()).find(|key| key.starts_with(stem))
     }
 }
 
@@ -547,13 +460,7 @@ impl Drop for Table<'_> {
                         format!("remove it, or use one of: {}", known.join(", "))
                     }
                 };
-                self.reading.note(self.fault_in(
-                    key.span(),
-                    self.field(name),
-                    "unknown".into(),
-                    "",
-                    &advice,
-                ));
+                self.reading.note(self.fault_in(key.span(), self.field(name), "unknown".into(), "", &advice));
             }
         }
     }
@@ -563,8 +470,8 @@ impl Drop for Table<'_> {
 fn nearest<'k>(name: &str, known: &'k BTreeSet<String>) -> Option<&'k str> {
     let stem = |key: &str| -> String {
         const UNITS: [&str; 20] = [
-            "us", "ms", "ns", "s", "hz", "m", "mm", "cm", "rad", "deg", "kg", "g", "n", "nm",
-            "rpm", "s2", "s3", "min", "pct", "percent",
+            "us", "ms", "ns", "s", "hz", "m", "mm", "cm", "rad", "deg", "kg", "g", "n", "nm", "rpm", "s2", "s3", "min",
+            "pct", "percent",
         ];
         let mut words: Vec<&str> = key.split('_').collect();
         while words.len() > 1 && words.last().is_some_and(|word| UNITS.contains(word)) {
@@ -589,9 +496,7 @@ fn distance(a: &str, b: &str) -> usize {
         let mut diagonal = row[0];
         row[0] = i + 1;
         for (j, y) in b.iter().enumerate() {
-            let next = (diagonal + usize::from(x != *y))
-                .min(row[j] + 1)
-                .min(row[j + 1] + 1);
+            let next = (diagonal + usize::from(x != *y)).min(row[j] + 1).min(row[j + 1] + 1);
             diagonal = row[j + 1];
             row[j + 1] = next;
         }

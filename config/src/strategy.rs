@@ -114,9 +114,7 @@ impl Verb {
     /// Who can do it.
     pub fn subject(self) -> Subject {
         match self {
-            Self::FetchAndAssemble | Self::Receive | Self::Finish | Self::AssembleHeld => {
-                Subject::Human
-            }
+            Self::FetchAndAssemble | Self::Receive | Self::Finish | Self::AssembleHeld => Subject::Human,
             _ => Subject::Robot,
         }
     }
@@ -213,24 +211,13 @@ fn range(table: &Table<'_>, bound: &Bound) -> Range {
     }
     let [min, max] = table.numbers(bound);
     if min > max {
-        table.refuse(
-            bound.key,
-            &format!("{min}..{max}"),
-            "smaller number first",
-            "swap the two numbers",
-        );
+        table.refuse(bound.key, &format!("{min}..{max}"), "smaller number first", "swap the two numbers");
     }
     Range { min, max }
 }
 
 fn names<T: Coded>(table: &Table<'_>, key: &str) -> Vec<T> {
-    let allowed = || {
-        T::ALL
-            .iter()
-            .map(|variant| variant.name())
-            .collect::<Vec<_>>()
-            .join(", ")
-    };
+    let allowed = || T::ALL.iter().map(|variant| variant.name()).collect::<Vec<_>>().join(", ");
     let texts = table.texts(key);
     if texts.is_empty() {
         table.refuse(key, "missing", &allowed(), "list at least one");
@@ -240,12 +227,7 @@ fn names<T: Coded>(table: &Table<'_>, key: &str) -> Vec<T> {
         .filter_map(|text| {
             let found = T::named(text);
             if found.is_none() {
-                table.refuse(
-                    key,
-                    &format!("\"{text}\""),
-                    &allowed(),
-                    "choose from these names",
-                );
+                table.refuse(key, &format!("\"{text}\""), &allowed(), "choose from these names");
             }
             found
         })
@@ -271,35 +253,17 @@ pub(crate) fn read_reference(root: &Table<'_>) -> Vec<ReferenceRow> {
             effort: table.number(&EFFORT),
         };
         if template.tool == Tool::None {
-            table.refuse(
-                "tool",
-                "\"none\"",
-                "one of the four tools",
-                "name the tool the mode needs",
-            );
+            table.refuse("tool", "\"none\"", "one of the four tools", "name the tool the mode needs");
         }
         if template.tool == Tool::VacuumGripper && template.oily != Some(false) {
-            table.refuse(
-                "oily",
-                "not false",
-                "false",
-                "suction does not hold an oily part: write `oily = false`",
-            );
+            table.refuse("oily", "not false", "false", "suction does not hold an oily part: write `oily = false`");
         }
         for class in names::<FeatureClass>(&table, "classes") {
-            rows.push(ReferenceRow {
-                class,
-                ..template.clone()
-            });
+            rows.push(ReferenceRow { class, ..template.clone() });
         }
     }
     if rows.is_empty() {
-        root.refuse(
-            "reference",
-            "missing",
-            "at least one row",
-            "add [[reference]] rows",
-        );
+        root.refuse("reference", "missing", "at least one row", "add [[reference]] rows");
     }
     rows
 }
@@ -309,38 +273,19 @@ pub(crate) fn read_strategies(root: &Table<'_>) -> Vec<StrategyRow> {
     let mut rows: Vec<StrategyRow> = Vec::new();
     for table in root.tables("strategy") {
         let name = table.text("name").unwrap_or_default();
-        if !name
-            .chars()
-            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
-            || name.len() > 32
-        {
+        if !name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_') || name.len() > 32 {
             let allowed = "at most 32 of a-z, 0-9, _";
-            table.refuse(
-                "name",
-                &format!("\"{name}\""),
-                allowed,
-                "names are database keys: keep them plain",
-            );
+            table.refuse("name", &format!("\"{name}\""), allowed, "names are database keys: keep them plain");
         }
         let form: Form = table.named("form").unwrap_or(Form::Robot);
-        let focus = if form == Form::Robot {
-            Focus::Robot
-        } else {
-            Focus::Human
-        };
+        let focus = if form == Form::Robot { Focus::Robot } else { Focus::Human };
         let mut steps = Vec::new();
         for verb in names::<Verb>(&table, "actions") {
-            steps.push(Step {
-                subject: verb.subject(),
-                verb,
-            });
+            steps.push(Step { subject: verb.subject(), verb });
         }
         check_sequence(&table, form, &steps);
-        let (classes, modes, tools) = (
-            names(&table, "classes"),
-            names(&table, "modes"),
-            names::<Tool>(&table, "tools"),
-        );
+        let (classes, modes, tools) =
+            (names(&table, "classes"), names(&table, "modes"), names::<Tool>(&table, "tools"));
         let template = StrategyRow {
             id: String::new(),
             class: FeatureClass::Other,
@@ -360,20 +305,9 @@ pub(crate) fn read_strategies(root: &Table<'_>) -> Vec<StrategyRow> {
                 for &tool in &tools {
                     let id = format!("{name}/{class}/{mode}/{tool}");
                     if rows.iter().any(|row| row.id == id) {
-                        table.refuse(
-                            "name",
-                            &format!("\"{name}\""),
-                            "a row once",
-                            "give each strategy its own name",
-                        );
+                        table.refuse("name", &format!("\"{name}\""), "a row once", "give each strategy its own name");
                     }
-                    rows.push(StrategyRow {
-                        id,
-                        class,
-                        mode,
-                        tool,
-                        ..template.clone()
-                    });
+                    rows.push(StrategyRow { id, class, mode, tool, ..template.clone() });
                 }
             }
         }
@@ -391,34 +325,12 @@ fn check_sequence(table: &Table<'_>, form: Form, steps: &[Step]) {
             &[V::ChangeTool, V::Grasp, V::Transfer, V::Place, V::Assemble],
         ],
         Form::Alone => &[&[V::FetchAndAssemble]],
-        Form::HandOver => &[&[
-            V::ChangeTool,
-            V::Grasp,
-            V::HandOver,
-            V::Receive,
-            V::Release,
-            V::Finish,
-        ]],
-        Form::Hold => &[&[
-            V::ChangeTool,
-            V::Grasp,
-            V::Hold,
-            V::AssembleHeld,
-            V::Release,
-        ]],
+        Form::HandOver => &[&[V::ChangeTool, V::Grasp, V::HandOver, V::Receive, V::Release, V::Finish]],
+        Form::Hold => &[&[V::ChangeTool, V::Grasp, V::Hold, V::AssembleHeld, V::Release]],
     };
     if !allowed.contains(&verbs.as_slice()) {
-        let join = |verbs: &[Verb]| {
-            verbs
-                .iter()
-                .map(|verb| verb.name())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
-        let choices: Vec<String> = allowed
-            .iter()
-            .map(|verbs| format!("[{}]", join(verbs)))
-            .collect();
+        let join = |verbs: &[Verb]| verbs.iter().map(|verb| verb.name()).collect::<Vec<_>>().join(", ");
+        let choices: Vec<String> = allowed.iter().map(|verbs| format!("[{}]", join(verbs))).collect();
         table.refuse(
             "actions",
             &format!("[{}]", join(&verbs)),

@@ -16,6 +16,7 @@ const HOVER: Bound = bound("hover_m", "m", 0.02, 0.4);
 const SPEED: Bound = bound("speed_free", "", 0.01, 1.0);
 const SPEED_CARRY: Bound = bound("speed_carry", "", 0.01, 1.0);
 const SPEED_NEAR: Bound = bound("speed_near", "", 0.01, 1.0);
+const START: Bound = bound("start_s", "s", 1.0, 600.0);
 const PRESENT: Bound = bound("present_s", "s", 0.1, 600.0);
 const RECOGNISE: Bound = bound("recognise_s", "s", 0.1, 600.0);
 const MOTION: Bound = bound("motion_s", "s", 1.0, 3600.0);
@@ -41,6 +42,8 @@ pub struct Capability {
 /// How long each wait may last, seconds; past it the wait is a fault, never a hang.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeouts {
+    /// All roles up, from the start.
+    pub start_s: f64,
     /// A request to the peripherals.
     pub present_s: f64,
     /// A recognition after a scan.
@@ -97,6 +100,7 @@ impl Supervisor {
                 harmful_by_hand: capability.flag("harmful_by_hand"),
             },
             timeouts: Timeouts {
+                start_s: timeouts.number(&START),
                 present_s: timeouts.number(&PRESENT),
                 recognise_s: timeouts.number(&RECOGNISE),
                 motion_s: timeouts.number(&MOTION),

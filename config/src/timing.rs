@@ -47,25 +47,14 @@ impl Timing {
         let table = cell.table("timing");
         let role = |name: &str| {
             let Some(table) = table.as_ref().and_then(|table| table.table(name)) else {
-                return Schedule {
-                    period: Duration::from_millis(1),
-                    phase: Duration::ZERO,
-                };
+                return Schedule { period: Duration::from_millis(1), phase: Duration::ZERO };
             };
             let (period, phase) = (table.whole(&PERIOD), table.whole(&PHASE));
             if phase >= period {
                 let allowed = format!("0..={} us", period - 1);
-                table.refuse(
-                    PHASE.key,
-                    &format!("{phase} us"),
-                    &allowed,
-                    "keep the phase below period_us",
-                );
+                table.refuse(PHASE.key, &format!("{phase} us"), &allowed, "keep the phase below period_us");
             }
-            Schedule {
-                period: Duration::from_micros(period.into()),
-                phase: Duration::from_micros(phase.into()),
-            }
+            Schedule { period: Duration::from_micros(period.into()), phase: Duration::from_micros(phase.into()) }
         };
         Self {
             plant: role("plant"),
@@ -112,11 +101,7 @@ pub struct Realtime {
 
 impl Realtime {
     pub(crate) fn read(cell: &Table<'_>) -> Self {
-        let mut out = Self {
-            policy: Policy::BestEffort,
-            priority: [None; 4],
-            cpu: [None; 4],
-        };
+        let mut out = Self { policy: Policy::BestEffort, priority: [None; 4], cpu: [None; 4] };
         let Some(table) = cell.table("realtime") else {
             return out;
         };
@@ -129,9 +114,7 @@ impl Realtime {
                 continue;
             };
             let index = role.code() as usize;
-            out.priority[index] = table
-                .has(PRIORITY.key)
-                .then(|| table.whole(&PRIORITY) as u8);
+            out.priority[index] = table.has(PRIORITY.key).then(|| table.whole(&PRIORITY) as u8);
             out.cpu[index] = table.has(CPU.key).then(|| table.whole(&CPU) as u16);
         }
         out

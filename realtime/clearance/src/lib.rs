@@ -1,1 +1,31 @@
 //! Distances between the arm and everything it must not touch, and the separation a person is owed.
+//!
+//! The arm is a set of capsules ([`ArmBody`]), the part it carries a box, the
+//! scene boxes, cylinders, capsules and spheres, a person a set of capsules.
+//! [`Monitor`] holds one of each and answers, for one position of the arm:
+//!
+//! - [`Monitor::clearance`]: the smallest signed distance to the scene and to the
+//!   arm itself, with the link, the object and the points;
+//! - [`Monitor::separation`]: the same towards people, with their velocity;
+//! - [`Monitor::is_clear`], [`Monitor::path_is_clear`]: whether a position, or a whole
+//!   straight motion of the joints, keeps a margin. The motion is swept, not sampled.
+//!
+//! [`ssm`] holds the arithmetic of speed and separation monitoring: how far the arm must
+//! stay from a person who moves, and how fast it may go at the distance there is.
+//!
+//! **Invariant:** no answer is larger than the truth, but for rounding (below 1e-9 m).
+//! Exact: capsules against everything, the part against boxes, capsules and spheres.
+//! The part against a cylinder errs on the near side, towards the edges of its caps.
+//! **Invariant:** what is not finite, or absurdly far off, is a contact: the answer is −∞.
+//! **Invariant:** nothing here allocates, blocks or panics; every loop has a constant bound.
+
+mod body;
+mod kernel;
+mod monitor;
+mod obstacle;
+pub mod ssm;
+mod sweep;
+
+pub use body::{ArmBody, BodyError, LINK_CAPSULES_MAX, LinkCapsule, SELF_PAIRS_MAX};
+pub use monitor::{Clearance, Monitor, Separation};
+pub use obstacle::SceneFault;

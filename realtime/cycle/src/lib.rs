@@ -1,1 +1,26 @@
 //! The fixed-rate loop: grid, clock, missed cycles, realtime set-up, allocation guard.
+//!
+//! ```text
+//! Grid      the instants t with t mod period = phase
+//! FixedRate waits for the next of them, says which it is, counts those that passed unused
+//! Record    what it found: lateness, time in the cycle, missed grid points
+//! setup     what the host granted: SCHED_FIFO, affinity, locked memory, timer slack
+//! guard     counts what a cycle allocates
+//! ```
+//!
+//! This crate is where the loop sleeps and reads the clock, so that nothing else
+//! under `realtime/` has to.
+
+mod clock;
+mod fixed_rate;
+mod grid;
+pub mod guard;
+mod histogram;
+mod record;
+pub mod setup;
+
+pub use clock::{Clock, Monotonic};
+pub use fixed_rate::{FixedRate, Tick};
+pub use grid::{Grid, GridError};
+pub use histogram::Histogram;
+pub use record::Record;

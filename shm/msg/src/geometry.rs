@@ -1,7 +1,7 @@
 //! Poses, capsules and the objects of a scene. Lengths in metres.
 
-use crate::coded::coded;
 use crate::Code;
+use crate::coded::coded;
 
 /// Place and orientation of one frame in another; named `a_from_b` where used.
 #[derive(Clone, Copy, Debug, PartialEq)]

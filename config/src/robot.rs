@@ -1,0 +1,226 @@
+//! The arm: a URDF read into a chain, a body of capsules and the masses of its links.
+//!
+//! Any serial chain of up to eight moving joints is accepted: fixed joints are
+//! folded into the link they hang on, collision primitives are covered by capsules,
+//! and the pairs of links that must not meet are worked out here. Everything else
+//! is refused with its place in the file: meshes, joints that mimic or branch off,
+//! links without mass or shape, limits that are none.
+//!
+//! **Invariant:** a [`Robot`] never covers less than its file's collision geometry.
+
+mod contact;
+mod inertia;
+mod shape;
+mod source;
+mod tree;
+
+use crate::fault::{Fault, Faults};
+use nalgebra::{Isometry3, Unit, Vector3};
+use source::Source;
+use std::path::{Path, PathBuf};
+use tandem_clearance::{ArmBody, LINK_CAPSULES_MAX, LinkCapsule};
+use tandem_kinematics::{Chain, JOINTS_MAX, Joint, JointKind};
+use tree::Tree;
+
+pub use inertia::LinkInertia;
+
+/// A joint without limits may turn this far either way, rad.
+const CONTINUOUS: f64 = 200.0 * std::f64::consts::PI;
+/// Acceleration of a joint whose file gives none: it reaches its speed in half a second.
+const ACCELERATION_PER_VELOCITY: f64 = 2.0;
+/// Jerk of a joint whose file gives none: it reaches its acceleration in a tenth of a second.
+const JERK_PER_ACCELERATION: f64 = 10.0;
+
+/// What a cell says of its arm beyond the URDF; lists have one entry a moving joint, in rad or m.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RobotOptions {
+    /// Link whose frame is the TCP; else `tcp`, else `tool0`, else the one link at the chain's end.
+    pub tcp: Option<String>,
+    /// Where the arm rests; else 0, or the limit nearest to it.
+    pub home: Option<Vec<f64>>,
+    /// Largest accelerations; else the URDF's (from version 1.2), else twice the velocity, per second.
+    pub acceleration_max: Option<Vec<f64>>,
+    /// Largest jerks; else the URDF's, else ten times the acceleration, per second.
+    pub jerk_max: Option<Vec<f64>>,
+}
+
+/// An arm that passed every check.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Robot {
+    /// Name in its file.
+    pub name: String,
+    /// The file.
+    pub file: PathBuf,
+    /// The file as it was read.
+    pub urdf: urdf_rs::Robot,
+    /// Moving joints and TCP.
+    pub chain: Chain,
+    /// Capsules around the links and the pairs of links that must not meet.
+    pub body: ArmBody,
+    /// Mass of each link of the chain, what is fixed to it included: `[0]` the base, `[i]` moved by joint i.
+    pub links: Vec<LinkInertia>,
+    /// Names of the moving joints, from the base outwards.
+    pub joint_names: Vec<String>,
+    /// Where the arm rests, rad or m.
+    pub home: [f64; JOINTS_MAX],
+}
+
+impl Robot {
+    /// Reads a URDF file.
+    ///
+    /// # Errors
+    /// All faults of the file.
+    pub fn load(file: &Path, options: &RobotOptions) -> Result<Self, Faults> {
+        let text = std::fs::read_to_string(file).map_err(|error| {
+            Faults::new(vec![Fault {
+                file: file.display().to_string(),
+                line: 0,
+                column: 0,
+                field: String::new(),
+                found: error.to_string(),
+                allowed: String::new(),
+                advice: "name a file that can be read".into(),
+            }])
+        })?;
+        Self::parse(file, &text, options).map_err(Faults::new)
+    }
+
+    /// Reads the text of a URDF; `file` is its name in messages.
+    ///
+    /// # Errors
+    /// All faults found, never none.
+    pub fn parse(file: &Path, text: &str, options: &RobotOptions) -> Result<Self, Vec<Fault>> {
+        let source = Source::scan(&file.display().to_string(), text)?;
+        let urdf = urdf_rs::read_from_string(text).map_err(|error| vec![source.refused(&error.to_string())])?;
+        let tree = Tree::of(&source, &urdf, options.tcp.as_deref())?;
+
+        let mut faults = Vec::new();
+        let joints = moving_joints(&source, &urdf, &tree, options, &mut faults);
+        let links = inertia::links(&source, &urdf, &tree, &mut faults);
+        let capsules = shape::capsules(&source, &urdf, &tree, &mut faults);
+        if capsules.len() > LINK_CAPSULES_MAX {
+            let found = format!("{} capsules around its links", capsules.len());
+            let allowed = format!("at most {LINK_CAPSULES_MAX}");
+            faults.push(source.fault_of_robot("robot", &found, &allowed, "give the links fewer collision shapes"));
+        }
+        if !faults.is_empty() {
+            return Err(faults);
+        }
+
+        let of_robot =
+            |error: &dyn std::fmt::Display| vec![source.fault_of_robot("", &error.to_string(), "", "mend the file")];
+        let chain = Chain::new(&joints, tree.tip_from_tcp).map_err(|error| of_robot(&error))?;
+        let home = home(&chain, options);
+        let body = body(&chain, &capsules, &home).map_err(|error| of_robot(&error))?;
+        Ok(Self {
+            name: urdf.name.clone(),
+            file: file.to_owned(),
+            joint_names: tree.chain.iter().map(|joint| urdf.joints[joint.index].name.clone()).collect(),
+            chain,
+            body,
+            links,
+            home,
+            urdf,
+        })
+    }
+}
+
+fn body(
+    chain: &Chain,
+    capsules: &[LinkCapsule],
+    home: &[f64; JOINTS_MAX],
+) -> Result<ArmBody, tandem_clearance::BodyError> {
+    let pairs = contact::pairs_to_check(chain, capsules, home)?;
+    ArmBody::new(capsules, &pairs)
+}
+
+fn home(chain: &Chain, options: &RobotOptions) -> [f64; JOINTS_MAX] {
+    let mut home = [0.0; JOINTS_MAX];
+    for (index, joint) in chain.joints().iter().enumerate() {
+        let wanted = options.home.as_ref().and_then(|home| home.get(index).copied()).unwrap_or(0.0);
+        home[index] = wanted.clamp(joint.position_min, joint.position_max);
+    }
+    home
+}
+
+/// The joints of the chain with their limits; those that cannot be are noted and left out.
+fn moving_joints(
+    source: &Source,
+    urdf: &urdf_rs::Robot,
+    tree: &Tree,
+    options: &RobotOptions,
+    faults: &mut Vec<Fault>,
+) -> Vec<Joint> {
+    let mut joints = Vec::new();
+    for (order, place) in tree.chain.iter().enumerate() {
+        let joint = &urdf.joints[place.index];
+        let prismatic = joint.joint_type == urdf_rs::JointType::Prismatic;
+        let unit = if prismatic { "m" } else { "rad" };
+        let mut refuse = |child: &str, what: &str, found: String, allowed: &str, advice: &str| {
+            faults.push(source.fault_in("joint", &joint.name, child, what, &found, allowed, advice));
+        };
+        let limit = &joint.limit;
+        let (position_min, position_max) = match joint.joint_type {
+            urdf_rs::JointType::Continuous => (-CONTINUOUS, CONTINUOUS),
+            _ => (limit.lower, limit.upper),
+        };
+        for (what, value) in [("limit lower", position_min), ("limit upper", position_max)] {
+            if !value.is_finite() {
+                refuse("limit", what, format!("{value} {unit}"), "finite numbers", "write how far the joint may go");
+            }
+        }
+        if position_min > position_max {
+            let found = format!("{position_min} {unit} above upper = {position_max} {unit}");
+            refuse("limit", "limit lower", found, "at most upper", "swap the limits");
+        }
+        for (what, value, rate) in [("limit velocity", limit.velocity, "/s"), ("limit effort", limit.effort, "")] {
+            if !(value.is_finite() && value > 0.0) {
+                let unit = match (rate, prismatic) {
+                    ("/s", _) => format!("{unit}/s"),
+                    (_, true) => "N".to_owned(),
+                    (_, false) => "Nm".to_owned(),
+                };
+                let advice = "write what the joint's motor can do";
+                refuse("limit", what, format!("{value} {unit}"), &format!("above 0 {unit}"), advice);
+            }
+        }
+        let axis = Vector3::from(joint.axis.xyz.0);
+        let Some(axis) = Unit::try_new(axis, 1e-6).filter(|axis| axis.iter().all(|x| x.is_finite())) else {
+            let [x, y, z] = joint.axis.xyz.0;
+            refuse("axis", "axis xyz", format!("\"{x} {y} {z}\""), "a direction", "write a vector that is not zero");
+            continue;
+        };
+        let chosen = |list: &Option<Vec<f64>>| list.as_ref().and_then(|list| list.get(order).copied());
+        let given = |value: f64| (value.is_finite() && value > 0.0).then_some(value);
+        let acceleration_max = chosen(&options.acceleration_max)
+            .or(given(limit.acceleration))
+            .unwrap_or(ACCELERATION_PER_VELOCITY * limit.velocity);
+        let jerk_max =
+            chosen(&options.jerk_max).or(given(limit.jerk)).unwrap_or(JERK_PER_ACCELERATION * acceleration_max);
+        joints.push(Joint {
+            kind: if prismatic { JointKind::Prismatic } else { JointKind::Revolute },
+            parent_from_joint: place.parent_from_joint,
+            axis,
+            position_min,
+            position_max,
+            velocity_max: limit.velocity,
+            acceleration_max,
+            jerk_max,
+            effort_max: limit.effort,
+        });
+    }
+    joints
+}
+
+/// A pose as a URDF writes it, or `None` when a number of it is not finite.
+fn origin(pose: &urdf_rs::Pose) -> Option<Isometry3<f64>> {
+    let finite = pose.xyz.iter().chain(pose.rpy.iter()).all(|x| x.is_finite());
+    let [roll, pitch, yaw] = pose.rpy.0;
+    finite.then(|| {
+        Isometry3::from_parts(
+            Vector3::from(pose.xyz.0).into(),
+            nalgebra::UnitQuaternion::from_euler_angles(roll, pitch, yaw),
+        )
+    })
+}

@@ -1,0 +1,169 @@
+//! Poses, Jacobians and inverse solutions against outside references.
+//!
+//! `data/*_fk.csv`: pinocchio 4.1.0 on the UR5 and Panda of the public package
+//! `example-robot-data` 6.0.0: joint positions, TCP pose, Jacobian in base axes.
+#![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
+
+use std::path::Path;
+
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use tandem_kinematics::{Chain, IkFailure, JOINTS_MAX, Joint, JointKind};
+
+fn rows(file: &str) -> Vec<Vec<f64>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file);
+    let text = std::fs::read_to_string(&path).expect("reference data is beside the test");
+    let number = |field: &str| field.parse().unwrap_or(f64::NAN);
+    text.lines().skip(1).map(|line| line.split(',').map(number).collect()).collect()
+}
+
+fn pose(n: &[f64]) -> Isometry3<f64> {
+    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(n[6], n[3], n[4], n[5]));
+    Isometry3::from_parts(Translation3::new(n[0], n[1], n[2]), rotation)
+}
+
+fn chain(robot: &str) -> Chain {
+    let rows = rows(&format!("{robot}_chain.csv"));
+    let (tool, joints) = rows.split_last().expect("the tool is the last row");
+    let joint = |row: &Vec<f64>| Joint {
+        kind: JointKind::Revolute,
+        parent_from_joint: pose(&row[1..8]),
+        axis: Unit::new_normalize(Vector3::new(row[8], row[9], row[10])),
+        position_min: row[11].max(-std::f64::consts::PI),
+        position_max: row[12].min(std::f64::consts::PI),
+        velocity_max: row[13],
+        acceleration_max: 10.0,
+        jerk_max: 100.0,
+        effort_max: 100.0,
+    };
+    let joints: Vec<Joint> = joints.iter().map(joint).collect();
+    Chain::new(&joints, pose(&tool[1..8])).expect("a reference robot is a chain")
+}
+
+fn positions(row: &[f64], count: usize) -> [f64; JOINTS_MAX] {
+    let mut position = [0.0; JOINTS_MAX];
+    position[..count].copy_from_slice(&row[..count]);
+    position
+}
+
+fn off_by(chain: &Chain, position: &[f64; JOINTS_MAX], goal: &Isometry3<f64>) -> (f64, f64) {
+    let pose = chain.forward(position).base_from_tcp;
+    let shift = (pose.translation.vector - goal.translation.vector).norm();
+    (shift, pose.rotation.angle_to(&goal.rotation))
+}
+
+/// TCP pose and Jacobian agree to 1e-9 on six and on seven joints.
+#[test]
+fn poses_and_jacobians_agree_with_the_reference() {
+    for (robot, count) in [("ur5", 6), ("panda", 7)] {
+        let chain = chain(robot);
+        let rows = rows(&format!("{robot}_fk.csv"));
+        assert!(rows.len() > 100, "{robot}: {} rows", rows.len());
+        for (index, row) in rows.iter().enumerate() {
+            let position = positions(row, count);
+            let (poses, jacobian) = chain.jacobian(&position);
+            let reference = pose(&row[count..count + 7]);
+            let (shift, turn) = off_by(&chain, &position, &reference);
+            // A rotation error is measured through acos, which halves the digits.
+            assert!(shift < 1e-9 && turn < 1e-7, "{robot} row {index}: {shift} m, {turn} rad");
+            let difference = poses.base_from_tcp.rotation.to_rotation_matrix().into_inner()
+                - reference.rotation.to_rotation_matrix().into_inner();
+            assert!(difference.amax() < 1e-9, "{robot} row {index}: {difference}");
+            for r in 0..6 {
+                for c in 0..count {
+                    let expected = row[count + 7 + r * count + c];
+                    assert!(
+                        (jacobian[(r, c)] - expected).abs() < 1e-9,
+                        "{robot} row {index}: J[{r}][{c}] = {}, reference {expected}",
+                        jacobian[(r, c)]
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Every reference pose of the UR5 is solved in closed form from a far seed, each branch exactly,
+/// and one branch is the reference position itself.
+#[test]
+fn the_closed_form_finds_every_branch() {
+    let chain = chain("ur5");
+    let mut counted = 0;
+    for (index, row) in rows("ur5_fk.csv").iter().enumerate() {
+        let position = positions(row, 6);
+        let goal = chain.forward(&position).base_from_tcp;
+        let branches = chain.branches(&goal, &[0.0; JOINTS_MAX]).unwrap_or_else(|e| panic!("row {index}: {e}"));
+        counted += branches.as_slice().len();
+        for branch in branches.as_slice() {
+            let (shift, turn) = off_by(&chain, branch, &goal);
+            assert!(shift < 1e-8 && turn < 3e-8, "row {index}: {shift} m, {turn} rad in {branch:?}");
+        }
+        let found = branches.as_slice().iter().any(|branch| {
+            branch
+                .iter()
+                .zip(&position)
+                .all(|(a, b)| (a - b).abs() < 1e-6 || ((a - b).abs() - std::f64::consts::TAU).abs() < 1e-6)
+        });
+        assert!(found, "row {index}: {position:?} is not among {branches:?}");
+        let nearest = chain.inverse(&goal, &position).expect("solved above");
+        assert!(nearest.iter().zip(&position).all(|(a, b)| (a - b).abs() < 1e-6), "row {index}: {nearest:?}");
+    }
+    assert!(counted as f64 / rows("ur5_fk.csv").len() as f64 > 5.0, "{counted} branches");
+}
+
+/// The seven-joint arm is solved numerically: all reference poses from a far seed.
+#[test]
+fn the_numeric_search_solves_reachable_poses() {
+    let chain = chain("panda");
+    let seed = [0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8, 0.0];
+    let mut failed = 0;
+    let rows = rows("panda_fk.csv");
+    for row in &rows {
+        let goal = pose(&row[7..14]);
+        match chain.inverse(&goal, &seed) {
+            Ok(solution) => {
+                let (shift, turn) = off_by(&chain, &solution, &goal);
+                assert!(shift < 1e-7 && turn < 1e-6, "{shift} m, {turn} rad");
+                assert!(chain.is_within_limits(&solution, 0.0), "{solution:?}");
+            }
+            Err(_) => failed += 1,
+        }
+    }
+    assert_eq!(failed, 0, "of {}", rows.len());
+}
+
+/// Each failure is told apart from the others.
+#[test]
+fn failures_are_typed() {
+    for robot in ["ur5", "panda"] {
+        let chain = chain(robot);
+        let seed = [0.1, -1.0, 0.2, -1.2, 0.3, 1.4, 0.5, 0.0];
+        let goal = chain.forward(&seed).base_from_tcp;
+        let far = Isometry3::translation(3.0, 0.0, 0.0) * goal;
+        assert_eq!(chain.inverse(&far, &seed), Err(IkFailure::Unreachable), "{robot}");
+        let mut broken = goal;
+        broken.translation.vector.x = f64::NAN;
+        assert_eq!(chain.inverse(&broken, &seed), Err(IkFailure::NotFinite), "{robot}");
+        let mut lost = seed;
+        lost[2] = f64::INFINITY;
+        assert_eq!(chain.inverse(&goal, &lost), Err(IkFailure::NotFinite), "{robot}");
+        // Every joint held to a hair's breadth far from the solution.
+        let held: Vec<Joint> =
+            chain.joints().iter().map(|joint| Joint { position_min: 2.9, position_max: 2.901, ..*joint }).collect();
+        let held = Chain::new(&held, *chain.tool()).expect("narrow limits are limits");
+        assert_eq!(held.inverse(&goal, &seed), Err(IkFailure::JointLimit), "{robot}");
+    }
+}
+
+/// A position that is not a number gives poses that say so, and nothing panics.
+#[test]
+fn what_is_not_finite_shows() {
+    let chain = chain("ur5");
+    for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        for joint in 0..6 {
+            let mut position = [0.3; JOINTS_MAX];
+            position[joint] = value;
+            assert!(!chain.forward(&position).is_finite(), "joint {joint} at {value}");
+        }
+    }
+    assert!(chain.forward(&[0.3; JOINTS_MAX]).is_finite());
+}

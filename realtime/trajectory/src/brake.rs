@@ -1,0 +1,120 @@
+//! The prefix that brings a start outside the limits back inside.
+//!
+//! It is part of the definition of the trajectory, because "within the limits" says nothing about
+//! a state outside them. First the acceleration returns to its band as fast as the jerk allows.
+//! Then a velocity that is above its limit `V`, or bound to pass it, is brought down as fast as
+//! possible: the acceleration falls (to `-B` at most, waiting there) until the velocity has come
+//! down to `V`, or until falling any longer would carry it below the opposite limit `W`:
+//!
+//! ```text
+//! a^2 = a0^2 + 2 (v0 - V) / beta                          the velocity is V at acceleration -|a|
+//! a^2 = (beta a0^2 + 2 (v0 - W)) / (alpha + beta)         zeroing -|a| by the jerk just leaves W
+//! ```
+//!
+//! The time-optimal motion proper starts there. A velocity below `W` is the same, mirrored.
+
+use crate::{
+    extremal::{Joint, Phase},
+    sqrt::sqrt,
+};
+
+/// Relative excess over a velocity limit that counts as being on it: roundings of the inputs.
+const TIE: f64 = 16.0 * f64::EPSILON;
+
+/// The steps before the motion proper, and the velocity and acceleration they end with.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Prefix {
+    /// Unused steps have no duration.
+    pub(crate) steps: [Phase; 2],
+    pub(crate) end: [f64; 2],
+}
+
+/// The prefix of a joint starting at `joint.start`; `velocity_min` is its lowest velocity.
+pub(crate) fn prefix(joint: &Joint, velocity_min: f64) -> Prefix {
+    let velocity = joint.start[0];
+    let mut prefix = Prefix { steps: [Phase::default(); 2], end: joint.start };
+    if joint.rise + joint.fall == 0.0 {
+        let (limit, braking) = if velocity > joint.peak {
+            (joint.peak, -joint.bottom)
+        } else if velocity < velocity_min {
+            (velocity_min, joint.top)
+        } else {
+            return prefix;
+        };
+        prefix.steps[0] = Phase { duration: (limit - velocity) / braking, velocity, acceleration: braking, slope: 0 };
+        prefix.end = [limit, 0.0];
+        return prefix;
+    }
+    prefix.contain(joint);
+    let below = joint.mirrored(-velocity_min);
+    if !prefix.lower(joint, velocity_min, 1.0) {
+        prefix.lower(&below, -joint.peak, -1.0);
+    }
+    prefix
+}
+
+/// The prefix of a joint whose velocity is not limited.
+pub(crate) fn acceleration_prefix(joint: &Joint) -> Prefix {
+    let mut prefix = Prefix { steps: [Phase::default(); 2], end: joint.start };
+    if joint.rise + joint.fall > 0.0 {
+        prefix.contain(joint);
+    }
+    prefix
+}
+
+impl Prefix {
+    /// Brings the acceleration into its band.
+    fn contain(&mut self, joint: &Joint) {
+        let acceleration = self.end[1];
+        if acceleration > joint.top {
+            self.push((acceleration - joint.top) * joint.fall, joint.fall, -1, joint.top);
+        } else if acceleration < -joint.bottom {
+            self.push((-joint.bottom - acceleration) * joint.rise, joint.rise, 1, -joint.bottom);
+        }
+    }
+
+    /// Appends a step that changes the acceleration to `to`; one over the jerk is `inverse`.
+    fn push(&mut self, duration: f64, inverse: f64, slope: i8, to: f64) {
+        let [velocity, acceleration] = self.end;
+        let step = Phase { duration, velocity, acceleration, slope };
+        let gain = if slope == 0 {
+            acceleration * duration
+        } else {
+            f64::from(slope) * inverse * (to - acceleration) * (to + acceleration) / 2.0
+        };
+        self.end = [velocity + gain, to];
+        let [first, second] = &mut self.steps;
+        if first.duration == 0.0 {
+            *first = step;
+        } else if first.slope == slope && slope != 0 && second.duration == 0.0 {
+            first.duration += duration;
+        } else {
+            *second = step;
+        }
+    }
+
+    /// Brings the velocity down to the limit `joint.peak` if it is above or bound to pass it.
+    /// `joint` is seen with signs turned by `sign`; says whether anything was to do.
+    fn lower(&mut self, joint: &Joint, velocity_min: f64, sign: f64) -> bool {
+        let Joint { peak, bottom, rise, fall, .. } = *joint;
+        let (v, a) = (sign * self.end[0], sign * self.end[1]);
+        let bound = if a > 0.0 { v + fall * a * a / 2.0 } else { v };
+        let scale = peak.abs() + v.abs() + fall * a * a;
+        if bound <= peak + TIE * scale || (a <= 0.0 && v - rise * a * a / 2.0 <= velocity_min) {
+            return false;
+        }
+        let at_peak = if fall > 0.0 { a * a + 2.0 * (v - peak) / fall } else { f64::INFINITY };
+        let at_floor = (fall * a * a + 2.0 * (v - velocity_min)) / (rise + fall);
+        let to = -sqrt(at_peak.min(at_floor).max(0.0)).min(bottom);
+        let slope = if sign > 0.0 { -1 } else { 1 };
+        self.push((fall * (a - to)).max(0.0), fall, slope, sign * to);
+        if to == -bottom {
+            let v = sign * self.end[0];
+            let wait = ((v - peak) / bottom).min((v - velocity_min) / bottom - rise * bottom / 2.0);
+            if wait > 0.0 {
+                self.push(wait, 0.0, 0, sign * to);
+            }
+        }
+        true
+    }
+}

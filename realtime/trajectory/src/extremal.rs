@@ -1,0 +1,417 @@
+//! The farthest a joint can get in a given duration.
+//!
+//! Among all motions from (v0, a0) to (vf, af) that take exactly `T` and keep the limits, one is
+//! above all others at every instant: it raises the velocity as early as it can and drops it as
+//! late as it can. Its acceleration rises from a0 to `x`, waits there if `x = A`, falls to zero,
+//! waits there (cruise) if the velocity has reached its limit `V`, falls on to `y`, waits there if
+//! `y = -B`, and rises to af. Without a cruise the fall goes through and `x`, `y` may have the same
+//! sign. The motion that gets least far is the same with every sign turned ([`Joint::mirrored`]).
+//!
+//! With `alpha = 1 / jerk_max`, `beta = 1 / |jerk_min|` and `m = (alpha + beta) / 2`, the velocity
+//! is `K0 + alpha a^2 / 2` on the first rise, `w - beta a^2 / 2` on the fall and
+//! `Kf + alpha a^2 / 2` on the last rise, where
+//!
+//! ```text
+//! K0 = v0 - alpha a0^2 / 2      Kf = vf - alpha af^2 / 2      c = (Kf - K0) / m
+//! w  = K0 + m x^2 + x hold(x)   = Kf + m y^2 + |y| hold(y)    (w: velocity at a = 0)
+//! T  = alpha (af - a0) + 2 m s,  2 m s = 2 m (x - y) + hold(x) + hold(y) + cruise
+//! ```
+//!
+//! so that for a given `T`, hence `s`, every case has a closed form:
+//!
+//! ```text
+//! no hold         x - y = s, x + y = c / s            valid while x <= A and y >= -B
+//! hold at A       x = A,  (A - y)^2 = 2 A s - c       hold = 2 m (s - (x - y))
+//! hold at -B      y = -B, (x + B)^2 = 2 B s + c       hold = 2 m (s - (x - y))
+//! both            w (1/A + 1/B) = 2 m (s - (A + B)/2) + K0/A + Kf/B
+//! cruise          w = V, x and y from V - K0 = m x^2 + .., V - Kf = m y^2 + ..
+//! ```
+//!
+//! The distance covered changes with the duration by
+//!
+//! ```text
+//! dP/dT = w - beta x y / 2     before the cruise,      dP/dT = V     with it
+//! ```
+//!
+//! whose zeros are roots of quadratics in each case. They, the changes of case and the start of
+//! the cruise cut the curve P(T) into at most 16 pieces, on each of which it is monotone and
+//! given by one formula.
+
+use crate::{root::root_between, sqrt::sqrt};
+
+/// One joint's velocity problem and limits, seen in one direction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Joint {
+    /// Velocity and acceleration at the start.
+    pub(crate) start: [f64; 2],
+    /// Velocity and acceleration at the end.
+    pub(crate) end: [f64; 2],
+    /// Highest velocity (`V`).
+    pub(crate) peak: f64,
+    /// Highest acceleration (`A`).
+    pub(crate) top: f64,
+    /// Lowest acceleration, negated (`B`).
+    pub(crate) bottom: f64,
+    /// `1 / jerk_max` (`alpha`).
+    pub(crate) rise: f64,
+    /// `1 / |jerk_min|` (`beta`).
+    pub(crate) fall: f64,
+}
+
+impl Joint {
+    /// The same joint with every sign turned; `peak` is its highest velocity then.
+    pub(crate) fn mirrored(&self, peak: f64) -> Self {
+        Joint {
+            start: [-self.start[0], -self.start[1]],
+            end: [-self.end[0], -self.end[1]],
+            peak,
+            top: self.bottom,
+            bottom: self.top,
+            rise: self.fall,
+            fall: self.rise,
+        }
+    }
+}
+
+/// Switching values of the farthest motion for one duration.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    /// Acceleration after the first rise (`x`).
+    pub(crate) high: f64,
+    /// Acceleration after the fall (`y`).
+    pub(crate) low: f64,
+    /// Velocity at zero acceleration on the line of the fall (`w`).
+    pub(crate) crest: f64,
+    /// Time waited at `high`.
+    pub(crate) hold_high: f64,
+    /// Time at the velocity limit.
+    pub(crate) cruise: f64,
+    /// Time waited at `low`.
+    pub(crate) hold_low: f64,
+}
+
+/// A part of a motion with constant jerk: its state at the start, without the position.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Phase {
+    pub(crate) duration: f64,
+    pub(crate) velocity: f64,
+    pub(crate) acceleration: f64,
+    /// +1 rising, 0 constant, -1 falling.
+    pub(crate) slope: i8,
+}
+
+/// The farthest motions of one joint, one for each duration.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Extremal {
+    joint: Joint,
+    k_start: f64,
+    k_end: f64,
+    c: f64,
+    /// `m`.
+    mean: f64,
+    /// `alpha (af - a0)`: the duration at `s = 0`.
+    offset: f64,
+    /// The shape that just reaches the velocity limit, and its duration.
+    peak_shape: Shape,
+    peak_time: f64,
+}
+
+/// Relative error of an evaluated distance, in units of its largest term.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+impl Extremal {
+    pub(crate) fn new(joint: Joint) -> Self {
+        let Joint { start: [v0, a0], end: [vf, af], peak, top, bottom, rise, fall } = joint;
+        let mean = (rise + fall) / 2.0;
+        let k_start = v0 - rise * a0 * a0 / 2.0;
+        let k_end = vf - rise * af * af / 2.0;
+        // The difference of the K without their rounding where both squares are large.
+        let k_gain = (vf - v0) - rise * (af - a0) * (af + a0) / 2.0;
+        let (high, hold_high) = climb(peak - k_start, top, mean);
+        let (low, hold_low) = climb(peak - k_end, bottom, mean);
+        let peak_shape = Shape { high, low: -low, crest: peak, hold_high, cruise: 0.0, hold_low };
+        let offset = rise * (af - a0);
+        let ramps = if mean == 0.0 { 0.0 } else { 2.0 * mean * (high + low) };
+        let peak_time = (offset + ramps + hold_high + hold_low).max(0.0);
+        let c = if mean == 0.0 { 0.0 } else { k_gain / mean };
+        Extremal { joint, k_start, k_end, c, mean, offset, peak_shape, peak_time }
+    }
+
+    /// The farthest motion of duration `time`, which must be a possible one ([`crate::swing`]).
+    pub(crate) fn shape(&self, time: f64) -> Shape {
+        if time >= self.peak_time {
+            return Shape { cruise: time - self.peak_time, ..self.peak_shape };
+        }
+        let Joint { start: [_, a0], end: [_, af], top, bottom, .. } = self.joint;
+        let (mean, c) = (self.mean, self.c);
+        if mean == 0.0 {
+            return self.both_held(time);
+        }
+        let s = (time - self.offset) / (2.0 * mean);
+        if s <= 0.0 {
+            // One rise from a0 to af, and nothing else.
+            let high = a0.min(af);
+            let crest = self.k_start + mean * high * high;
+            return Shape { high, low: high, crest, hold_high: 0.0, cruise: 0.0, hold_low: 0.0 };
+        }
+        let u = c / s;
+        let (above, below) = (s + u > 2.0 * top, s - u > 2.0 * bottom);
+        if !above && !below {
+            let (high, low) = ((s + u) / 2.0, (u - s) / 2.0);
+            let crest = (self.k_start + self.k_end + mean * (high * high + low * low)) / 2.0;
+            return Shape { high, low, crest, hold_high: 0.0, cruise: 0.0, hold_low: 0.0 };
+        }
+        if above {
+            let fall = sqrt((2.0 * top * s - c).max(0.0));
+            let low = top - fall;
+            if low >= -bottom {
+                let hold_high = (2.0 * mean * (s - fall)).max(0.0);
+                return Shape {
+                    high: top,
+                    low,
+                    crest: self.k_end + mean * low * low,
+                    hold_high,
+                    cruise: 0.0,
+                    hold_low: 0.0,
+                };
+            }
+        }
+        if below {
+            let fall = sqrt((2.0 * bottom * s + c).max(0.0));
+            let high = fall - bottom;
+            if high <= top {
+                let hold_low = (2.0 * mean * (s - fall)).max(0.0);
+                return Shape {
+                    high,
+                    low: -bottom,
+                    crest: self.k_start + mean * high * high,
+                    hold_high: 0.0,
+                    cruise: 0.0,
+                    hold_low,
+                };
+            }
+        }
+        self.both_held(time)
+    }
+
+    fn both_held(&self, time: f64) -> Shape {
+        let Joint { top, bottom, .. } = self.joint;
+        let free = time - self.offset - self.mean * (top + bottom);
+        let crest = (free + self.k_start / top + self.k_end / bottom) / (1.0 / top + 1.0 / bottom);
+        let hold_high = ((crest - self.k_start) / top - self.mean * top).max(0.0);
+        let hold_low = ((crest - self.k_end) / bottom - self.mean * bottom).max(0.0);
+        Shape { high: top, low: -bottom, crest, hold_high, cruise: 0.0, hold_low }
+    }
+
+    /// Distance covered by a shape.
+    pub(crate) fn distance(&self, shape: &Shape) -> f64 {
+        let Joint { start: [_, a0], end: [_, af], rise, fall, .. } = self.joint;
+        let Shape { high: x, low: y, crest, hold_high, cruise, hold_low } = *shape;
+        let (xx, yy) = (x * x, y * y);
+        let mut distance = cruise * crest;
+        if self.mean > 0.0 {
+            distance += rise * (x - a0) * (self.k_start + rise * (xx + x * a0 + a0 * a0) / 6.0);
+            distance += fall * (x - y) * (crest - fall * (xx + x * y + yy) / 6.0);
+            distance += rise * (af - y) * (self.k_end + rise * (af * af + af * y + yy) / 6.0);
+        }
+        if hold_high > 0.0 {
+            distance += hold_high * (self.k_start + crest + (rise - fall) * xx / 2.0) / 2.0;
+        }
+        if hold_low > 0.0 {
+            distance += hold_low * (self.k_end + crest + (rise - fall) * yy / 2.0) / 2.0;
+        }
+        distance
+    }
+
+    /// Distance covered in `time`.
+    pub(crate) fn distance_in(&self, time: f64) -> f64 {
+        self.distance(&self.shape(time))
+    }
+
+    /// dP/dT.
+    fn slope(&self, shape: &Shape) -> f64 {
+        if shape.cruise > 0.0 || self.mean == 0.0 {
+            shape.crest
+        } else {
+            shape.crest - self.joint.fall * shape.high * shape.low / 2.0
+        }
+    }
+
+    /// How exactly a distance at `time` is known.
+    pub(crate) fn tolerance(&self, time: f64) -> f64 {
+        let crest = self
+            .joint
+            .peak
+            .abs()
+            .min(self.k_start.abs() + self.k_end.abs() + self.joint.top.min(self.joint.bottom) * time);
+        ROUNDING * time * (self.k_start.abs() + self.k_end.abs() + crest)
+    }
+
+    /// The first duration in `[from, to]` at which `distance` is covered, when less is covered at
+    /// `from`. Less than `tie` short of it counts as covered.
+    pub(crate) fn first_covering(&self, distance: f64, tie: f64, from: f64, to: f64) -> Option<f64> {
+        let mut marks = Marks::between(from, to.min(self.peak_time));
+        if from < self.peak_time {
+            self.mark_pieces(&mut marks);
+            marks.push(to.min(self.peak_time));
+        }
+        let mut piece_start = from;
+        for &mark in marks.sorted() {
+            let covered = self.distance_in(mark);
+            if covered >= distance - tie {
+                let exact = |time: f64| {
+                    let shape = self.shape(time);
+                    (self.distance(&shape) - distance, self.slope(&shape))
+                };
+                return Some(if covered <= distance {
+                    mark
+                } else {
+                    root_between(exact, self.tolerance(mark) / 16.0, piece_start, mark)
+                });
+            }
+            piece_start = mark;
+        }
+        if to <= self.peak_time || self.joint.peak <= 0.0 {
+            return None;
+        }
+        let begin = from.max(self.peak_time);
+        let time = begin + (distance - self.distance_in(begin)).max(0.0) / self.joint.peak;
+        (time <= to).then_some(time)
+    }
+
+    /// Marks every duration at which the formula or the sign of the slope of P changes.
+    fn mark_pieces(&self, marks: &mut Marks) {
+        let Joint { start: [v0, _], end: [vf, _], top, bottom, rise, fall, .. } = self.joint;
+        let (mean, c, k_start, k_end) = (self.mean, self.c, self.k_start, self.k_end);
+        if mean == 0.0 {
+            marks.push(-v0 / top - vf / bottom);
+            return;
+        }
+        let mut mark = |s: f64| marks.push(self.offset + 2.0 * mean * s);
+        // Changes of case.
+        if top.is_finite() && top * top >= c {
+            let half = sqrt(top * top - c);
+            mark(top - half);
+            mark(top + half);
+        }
+        if bottom.is_finite() && bottom * bottom >= -c {
+            let half = sqrt(bottom * bottom + c);
+            mark(bottom - half);
+            mark(bottom + half);
+        }
+        if top.is_finite() && bottom.is_finite() {
+            let both = (top + bottom) * (top + bottom);
+            mark((both + c) / (2.0 * top));
+            mark((both - c) / (2.0 * bottom));
+            // Slope with both held: w = -beta A B / 2.
+            let crest = -fall * top * bottom / 2.0;
+            mark(((crest - k_start) / top + (crest - k_end) / bottom) / (2.0 * mean) + (top + bottom) / 2.0);
+        }
+        // Slope without hold: (alpha + 2 beta) s^4 + 4 (K0 + Kf) s^2 + alpha c^2 = 0.
+        for square in quadratic(rise + 2.0 * fall, 2.0 * (k_start + k_end), rise * c * c) {
+            if square > 0.0 {
+                mark(sqrt(square));
+            }
+        }
+        // Slope while held at A: m y^2 - beta A y / 2 + Kf = 0, and the same in reverse at -B.
+        if top.is_finite() {
+            for low in quadratic(mean, -fall * top / 4.0, k_end) {
+                mark(((top - low) * (top - low) + c) / (2.0 * top));
+            }
+        }
+        if bottom.is_finite() {
+            for high in quadratic(mean, fall * bottom / 4.0, k_start) {
+                mark(((bottom + high) * (bottom + high) - c) / (2.0 * bottom));
+            }
+        }
+    }
+
+    /// The constant-jerk parts of a shape, in order; some may have no duration.
+    pub(crate) fn phases(&self, shape: &Shape) -> [Phase; 7] {
+        let Joint { start: [v0, a0], end: [_, af], rise, fall, .. } = self.joint;
+        let Shape { high: x, low: y, crest, hold_high, cruise, hold_low } = *shape;
+        let phase = |duration: f64, velocity: f64, acceleration: f64, slope: i8| Phase {
+            duration,
+            velocity,
+            acceleration,
+            slope,
+        };
+        if self.mean == 0.0 {
+            let none = Phase::default();
+            let v = self.k_start;
+            return [
+                none,
+                phase(hold_high, v, x, 0),
+                none,
+                phase(cruise, crest, 0.0, 0),
+                none,
+                phase(hold_low, crest, y, 0),
+                none,
+            ];
+        }
+        let (down, over) = if cruise > 0.0 { (x, -y) } else { (x - y, 0.0) };
+        [
+            phase(rise * (x - a0), v0, a0, 1),
+            phase(hold_high, self.k_start + rise * x * x / 2.0, x, 0),
+            phase(fall * down, crest - fall * x * x / 2.0, x, -1),
+            phase(cruise, crest, 0.0, 0),
+            phase(fall * over, crest, 0.0, -1),
+            phase(hold_low, crest - fall * y * y / 2.0, y, 0),
+            phase(rise * (af - y), self.k_end + rise * y * y / 2.0, y, 1),
+        ]
+    }
+}
+
+/// The acceleration and the wait at it with which a velocity `gain` is made from rest to rest.
+fn climb(gain: f64, limit: f64, mean: f64) -> (f64, f64) {
+    let gain = gain.max(0.0);
+    if mean == 0.0 {
+        (limit, gain / limit)
+    } else if gain > mean * limit * limit {
+        (limit, gain / limit - mean * limit)
+    } else {
+        (sqrt(gain / mean), 0.0)
+    }
+}
+
+/// Real roots of `a z^2 + 2 b z + c` with `a > 0`, without cancellation; empty is NaN.
+fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
+    let discriminant = b * b - a * c;
+    if discriminant < 0.0 {
+        return [f64::NAN; 2];
+    }
+    let root = sqrt(discriminant);
+    let q = if b > 0.0 { -b - root } else { root - b };
+    [q / a, if q == 0.0 { 0.0 } else { c / q }]
+}
+
+/// Durations inside an open interval, sorted; at most 16.
+struct Marks {
+    times: [f64; 16],
+    count: usize,
+    from: f64,
+    to: f64,
+}
+
+impl Marks {
+    fn between(from: f64, to: f64) -> Self {
+        Marks { times: [0.0; 16], count: 0, from, to }
+    }
+
+    /// Keeps `time` if it lies inside; NaN does not.
+    fn push(&mut self, time: f64) {
+        if time > self.from && time <= self.to && self.count < self.times.len() {
+            let mut place = self.count;
+            while place > 0 && self.times[place - 1] > time {
+                self.times[place] = self.times[place - 1];
+                place -= 1;
+            }
+            self.times[place] = time;
+            self.count += 1;
+        }
+    }
+
+    fn sorted(&self) -> &[f64] {
+        &self.times[..self.count]
+    }
+}

@@ -1,0 +1,124 @@
+//! What a trajectory is asked for.
+
+use crate::{
+    error::Error,
+    extremal::Joint,
+    state::{Limits, State},
+};
+
+/// Relative excess of a target over a limit that counts as being on it: roundings of the inputs.
+const TIE: f64 = 4.0 * f64::EPSILON;
+
+/// What a joint's target is.
+#[repr(u8)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Interface {
+    /// Position, velocity and acceleration.
+    #[default]
+    Position,
+    /// Velocity and acceleration; where the joint ends is free, and the velocity limits are not
+    /// used: the fastest change of velocity is wanted.
+    Velocity,
+}
+
+/// How a joint shares its duration with the others.
+#[repr(u8)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Synchronization {
+    /// All such joints arrive together.
+    #[default]
+    Time,
+    /// As [`Synchronization::Time`] if the target moves; a target at rest is reached as early as
+    /// the joint can.
+    TimeIfNecessary,
+    /// On a straight line through joint space if the states lie on one and that takes no longer
+    /// than arriving together; otherwise as [`Synchronization::Time`].
+    Phase,
+    /// On a straight line, slower if it must be; [`Error::NotStraight`] if the states lie on none.
+    StrictPhase,
+    /// As early as the joint can.
+    None,
+}
+
+/// A motion to calculate: where each of `N` joints is, where it shall go, and its limits.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input<const N: usize> {
+    /// State at the start. It may lie outside the limits; the trajectory then begins by braking.
+    pub start: [State; N],
+    /// State at the end, within the limits.
+    pub target: [State; N],
+    /// Limits of each joint.
+    pub limits: [Limits; N],
+    /// The shortest duration wanted, in seconds; 0 for none.
+    pub minimum_duration: f64,
+    /// If above 0, durations are whole multiples of it, in seconds.
+    pub duration_step: f64,
+    /// A joint that is not enabled goes on with constant acceleration from its start.
+    pub enabled: [bool; N],
+    /// What each joint's target is.
+    pub interface: [Interface; N],
+    /// How each joint shares its duration with the others.
+    pub synchronization: [Synchronization; N],
+}
+
+impl<const N: usize> Default for Input<N> {
+    /// All joints enabled, at rest at zero, with unit limits, arriving together.
+    fn default() -> Self {
+        Input {
+            start: [State::default(); N],
+            target: [State::default(); N],
+            limits: [Limits::default(); N],
+            minimum_duration: 0.0,
+            duration_step: 0.0,
+            enabled: [true; N],
+            interface: [Interface::Position; N],
+            synchronization: [Synchronization::Time; N],
+        }
+    }
+}
+
+/// The limits of one joint as the solver wants them, after a check.
+pub(crate) fn joint(
+    index: usize,
+    interface: Interface,
+    start: &State,
+    target: &State,
+    limits: &Limits,
+) -> Result<Joint, Error> {
+    if !start.is_finite() || !target.is_finite() {
+        return Err(Error::NotFinite { joint: index });
+    }
+    let Limits { velocity_min, velocity_max, acceleration_min, acceleration_max, jerk_min, jerk_max } = *limits;
+    let velocities = velocity_min <= 0.0 && velocity_max >= 0.0 && velocity_min.is_finite() && velocity_max.is_finite();
+    let signs = acceleration_min < 0.0 && acceleration_max > 0.0 && jerk_min < 0.0 && jerk_max > 0.0;
+    if !signs || (interface == Interface::Position && !velocities) {
+        return Err(Error::Limits { joint: index });
+    }
+    let joint = Joint {
+        start: [start.velocity, start.acceleration],
+        end: [target.velocity, target.acceleration],
+        peak: velocity_max,
+        top: acceleration_max,
+        bottom: -acceleration_min,
+        rise: 1.0 / jerk_max,
+        fall: -1.0 / jerk_min,
+    };
+    let (v, a) = (target.velocity, target.acceleration);
+    let over = |value: f64, limit: f64| value - limit > TIE * (value.abs() + limit.abs());
+    if interface == Interface::Position && (over(v, velocity_max) || over(-v, -velocity_min)) {
+        return Err(Error::TargetVelocity { joint: index });
+    }
+    if joint.rise + joint.fall == 0.0 {
+        return Ok(joint);
+    }
+    if over(a, acceleration_max) || over(-a, -acceleration_min) {
+        return Err(Error::TargetAcceleration { joint: index });
+    }
+    let before = if a < 0.0 { v + joint.fall * a * a / 2.0 } else { v };
+    let after = if a > 0.0 { v - joint.rise * a * a / 2.0 } else { v };
+    if interface == Interface::Position && (over(before, velocity_max) || over(-after, -velocity_min)) {
+        return Err(Error::TargetAcceleration { joint: index });
+    }
+    Ok(joint)
+}

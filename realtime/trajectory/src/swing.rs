@@ -1,0 +1,169 @@
+//! In which durations a joint can get from one velocity and acceleration to another.
+//!
+//! Write `alpha = 1 / jerk_max` (seconds per unit of acceleration when it rises), `beta =
+//! 1 / |jerk_min|` (when it falls), `A` for the highest acceleration and `-B` for the lowest. In a
+//! given duration `T` the velocity gained is largest when the acceleration first rises to some `x`
+//! (waits there if `x = A`) and then falls to its final value; smallest when it first falls to some
+//! `y` and then rises. Every gain between the two is reached by a mixture of both, because jerk and
+//! acceleration limits are convex. So a duration is possible if and only if
+//!
+//! ```text
+//! low(T) <= gain <= high(T)
+//! high: T = alpha (x - a0) + beta (x - af)   2 high = alpha (x^2 - a0^2) + beta (x^2 - af^2)
+//! low:  T = beta (a0 - y) + alpha (af - y)   2 low  = beta (a0^2 - y^2) + alpha (af^2 - y^2)
+//! ```
+//!
+//! plus a wait at `A` or `-B`. Both curves leave the same point, the *tip*: one jerk straight from
+//! `a0` to `af`. The slope of `high` is `x`, that of `low` is `y`, so `high` meets a gain above the
+//! tip exactly once, and `low` lies above it at most once, for `y` in `(-r, r)`: that is the gap.
+//! It is there when both accelerations are positive: a short transition gains little, a long one
+//! must first get rid of the acceleration.
+
+use crate::{
+    extremal::{Joint, Phase},
+    sqrt::sqrt,
+};
+
+/// Relative width within which a gain counts as the gain of the tip: some roundings of the inputs.
+const TIE: f64 = 8.0 * f64::EPSILON;
+
+/// A change of velocity: `gain` while the acceleration goes from `start` to `end`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Swing {
+    /// Acceleration at the start (`a0`).
+    pub(crate) start: f64,
+    /// Acceleration at the end (`af`).
+    pub(crate) end: f64,
+    /// Velocity to gain.
+    pub(crate) gain: f64,
+    /// Highest acceleration (`A`).
+    pub(crate) top: f64,
+    /// Lowest acceleration, negated (`B`).
+    pub(crate) bottom: f64,
+    /// `1 / jerk_max` (`alpha`).
+    pub(crate) rise: f64,
+    /// `1 / |jerk_min|` (`beta`).
+    pub(crate) fall: f64,
+}
+
+/// The possible durations: from `first` on, except the open interval `(gap_start, gap_end)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Durations {
+    pub(crate) first: f64,
+    /// Infinite without a gap.
+    pub(crate) gap_start: f64,
+    /// Infinite without a gap.
+    pub(crate) gap_end: f64,
+}
+
+impl Durations {
+    /// The first possible duration not below `time`.
+    pub(crate) fn next(&self, time: f64) -> f64 {
+        let time = time.max(self.first);
+        if time > self.gap_start && time < self.gap_end { self.gap_end } else { time }
+    }
+
+    /// The end of the connected part that holds `time`.
+    pub(crate) fn end(&self, time: f64) -> f64 {
+        if time <= self.gap_start { self.gap_start } else { f64::INFINITY }
+    }
+}
+
+impl Swing {
+    pub(crate) fn of(joint: &Joint) -> Self {
+        let Joint { start: [v0, a0], end: [vf, af], top, bottom, rise, fall, .. } = *joint;
+        Swing { start: a0, end: af, gain: vf - v0, top, bottom, rise, fall }
+    }
+
+    /// The possible durations of this swing. `velocity_scale` is the size of the velocities whose
+    /// difference `gain` is, for the width of a tie.
+    pub(crate) fn durations(&self, velocity_scale: f64) -> Durations {
+        let Swing { start, end, gain, top, bottom, rise, fall } = *self;
+        let none = f64::INFINITY;
+        if rise + fall == 0.0 {
+            let first = if gain >= 0.0 { gain / top } else { -gain / bottom };
+            return Durations { first, gap_start: none, gap_end: none };
+        }
+        let squares = end * end - start * start;
+        let (tip_time, tip_gain) = if end >= start {
+            (rise * (end - start), rise * squares / 2.0)
+        } else {
+            (fall * (start - end), -fall * squares / 2.0)
+        };
+        let scale = velocity_scale + (rise + fall) * (start * start + end * end) / 2.0;
+        if (gain - tip_gain).abs() <= TIE * scale {
+            let mut durations = Durations { first: tip_time, gap_start: none, gap_end: none };
+            if start.min(end) > 0.0 {
+                (durations.gap_start, durations.gap_end) = self.gap();
+            } else if start.max(end) < 0.0 {
+                (durations.gap_start, durations.gap_end) = self.mirrored().gap();
+            }
+            durations.gap_start = durations.gap_start.max(tip_time);
+            durations
+        } else if gain > tip_gain {
+            self.above()
+        } else {
+            self.mirrored().above()
+        }
+    }
+
+    /// The motion that gains most velocity in `time`, and that gain.
+    pub(crate) fn highest(&self, time: f64, velocity: f64) -> ([Phase; 7], f64) {
+        let Swing { start, end, top, rise, fall, .. } = *self;
+        let mut phases = [Phase::default(); 7];
+        if rise + fall == 0.0 {
+            phases[0] = Phase { duration: time, velocity, acceleration: top, slope: 0 };
+            return (phases, top * time);
+        }
+        let free = (time + rise * start + fall * end) / (rise + fall);
+        let (turn, hold) = if free > top { (top, (free - top) * (rise + fall)) } else { (free, 0.0) };
+        let climb = rise * (turn - start) * (turn + start) / 2.0;
+        phases[0] = Phase { duration: rise * (turn - start), velocity, acceleration: start, slope: 1 };
+        phases[1] = Phase { duration: hold, velocity: velocity + climb, acceleration: turn, slope: 0 };
+        phases[2] = Phase {
+            duration: fall * (turn - end),
+            velocity: velocity + climb + hold * turn,
+            acceleration: turn,
+            slope: -1,
+        };
+        (phases, climb + hold * turn + fall * (turn - end) * (turn + end) / 2.0)
+    }
+
+    /// The same swing with every sign turned.
+    pub(crate) fn mirrored(&self) -> Self {
+        let Swing { start, end, gain, top, bottom, rise, fall } = *self;
+        Swing { start: -start, end: -end, gain: -gain, top: bottom, bottom: top, rise: fall, fall: rise }
+    }
+
+    /// Durations when the gain lies above that of the tip: `high` gives the first, `low` the gap.
+    fn above(&self) -> Durations {
+        let Swing { start, end, gain, top, rise, fall, .. } = *self;
+        let turn = sqrt((2.0 * gain + rise * start * start + fall * end * end) / (rise + fall));
+        let first = if turn <= top {
+            rise * (turn - start) + fall * (turn - end)
+        } else {
+            let ramps = (rise * (top * top - start * start) + fall * (top * top - end * end)) / 2.0;
+            rise * (top - start) + fall * (top - end) + (gain - ramps) / top
+        };
+        let (gap_start, gap_end) = if start > 0.0 && end > 0.0 { self.gap() } else { (f64::INFINITY, f64::INFINITY) };
+        Durations { first: first.max(0.0), gap_start: gap_start.max(first), gap_end }
+    }
+
+    /// Where `low` exceeds the gain, for positive accelerations at both ends.
+    fn gap(&self) -> (f64, f64) {
+        let Swing { start, end, gain, bottom, rise, fall, .. } = *self;
+        let squared = (fall * start * start + rise * end * end - 2.0 * gain) / (rise + fall);
+        if squared <= 0.0 || squared.is_nan() {
+            return (f64::INFINITY, f64::INFINITY);
+        }
+        let turn = sqrt(squared);
+        let middle = fall * start + rise * end;
+        let gap_end = if turn <= bottom {
+            middle + (rise + fall) * turn
+        } else {
+            let ramps = (fall * (start * start - bottom * bottom) + rise * (end * end - bottom * bottom)) / 2.0;
+            middle + (rise + fall) * bottom + (ramps - gain) / bottom
+        };
+        (middle - (rise + fall) * turn, gap_end)
+    }
+}

@@ -1,0 +1,66 @@
+//! The command line: what a person types, and what comes back.
+//!
+//! Data goes to standard output, messages and progress to standard error. Every
+//! verb that reports takes `--json` and then prints one object a line. Exit codes
+//! are in [`exit`].
+
+mod check;
+mod doctor;
+pub mod exit;
+mod journal;
+mod progress;
+mod role;
+mod run;
+mod table;
+mod train;
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// A zero-copy realtime controller for human-robot assembly workcells.
+#[derive(Parser)]
+#[command(name = "tandem", version, about, max_term_width = 110, after_help = exit::HELP)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Start a cell and assemble boxes
+    Run(run::RunArgs),
+    /// Read and check every file, model and database of a cell; nothing starts
+    Check(check::CheckArgs),
+    /// What this host offers a realtime loop, and how to mend what it lacks
+    Doctor(doctor::DoctorArgs),
+    /// What was done to each box, by whom, when
+    Journal(journal::JournalArgs),
+    /// Make the trained models that ship in config/models
+    Train(train::TrainArgs),
+    /// One role of a running cell (started by `tandem run`)
+    #[command(hide = true)]
+    Role(role::RoleArgs),
+}
+
+/// Reads the command line, does what it says and answers with the exit code.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            let asked = !error.use_stderr();
+            // Nothing can be done about a closed terminal here.
+            let _ = error.print();
+            return if asked { exit::OK.into() } else { exit::USAGE.into() };
+        }
+    };
+    let code = match cli.command {
+        Command::Run(args) => run::run(&args),
+        Command::Check(args) => check::check(&args),
+        Command::Doctor(args) => doctor::doctor(&args),
+        Command::Journal(args) => journal::journal(&args),
+        Command::Train(args) => train::train(&args),
+        Command::Role(args) => role::role(&args),
+    };
+    code.into()
+}

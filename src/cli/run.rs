@@ -1,0 +1,203 @@
+//! `tandem run`: starts a cell and assembles boxes.
+
+use std::path::PathBuf;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+use clap::Args;
+use comfy_table::{Table, presets};
+use serde_json::json;
+use tandem_config::Cell;
+
+use super::progress::Screen;
+use super::{check, exit};
+use crate::live::{self, signals};
+use crate::lockstep::SimCell;
+use crate::strategy::Library;
+use crate::strategy::store::{RunRecord, Store, StoreError, default_url};
+use crate::supervisor::{Event, Outcome, RunOptions, Summary};
+
+#[derive(Args)]
+pub(super) struct RunArgs {
+    /// Cell file, such as config/cells/s471.toml
+    cell: PathBuf,
+    /// Product instead of the one the cell file names: its name, or a .toml file
+    #[arg(long)]
+    product: Option<String>,
+    /// Boxes to assemble
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    boxes: u32,
+    /// Decides everything that varies: where parts lie, noise, what the person does
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// All roles in one process on a virtual clock: same decisions, far faster than real time
+    #[arg(long)]
+    lockstep: bool,
+    /// Database instead of the one the cell file names: sqlite://FILE or mysql://USER@HOST/DATABASE
+    #[arg(long, value_name = "URL")]
+    store: Option<String>,
+    /// Print one JSON object a line and a summary as the last
+    #[arg(long)]
+    json: bool,
+}
+
+/// How a run ended, in either shell.
+struct Ended {
+    outcome: Outcome,
+    summary: Summary,
+}
+
+pub(super) fn run(args: &RunArgs) -> u8 {
+    let cell = match Cell::load(&args.cell, args.product.as_deref()) {
+        Ok(cell) => cell,
+        Err(faults) => return check::report_faults(&faults, args.json),
+    };
+    let record = record(args, &cell);
+    let (mut store, library) = match open_store(args.store.as_deref(), &cell, &record) {
+        Ok(opened) => opened,
+        Err(error) => {
+            anstream::eprintln!("{error}");
+            return exit::CONFIG;
+        }
+    };
+    let options = RunOptions { boxes: args.boxes, seed: args.seed, run_id: record.id.clone() };
+    let began = Instant::now();
+    let mut screen = (!args.json).then(Screen::new);
+    let mut on_event = |event: &Event| match &mut screen {
+        Some(screen) => screen.show(event),
+        None => anstream::println!("{}", serde_json::to_string(event).unwrap_or_default()),
+    };
+    let ended = if args.lockstep {
+        lockstep(&cell, &mut store, library, options, &mut on_event)
+    } else {
+        live(&cell, args.product.as_deref(), &mut store, library, options, &mut on_event)
+    };
+    if let Some(screen) = &screen {
+        screen.finish();
+    }
+    let word = ended.as_ref().map_or("failed", |ended| ended.outcome.name());
+    if let Err(error) = store.end(&record.id, word) {
+        anstream::eprintln!("{error}");
+    }
+    match ended {
+        Ok(ended) => {
+            report(args, &ended, began.elapsed().as_secs_f64(), &record.id, &store);
+            exit_code(&ended.outcome)
+        }
+        Err(message) => {
+            anstream::eprintln!("{message}");
+            exit::FAILED
+        }
+    }
+}
+
+/// The database a cell keeps its library and journal in.
+pub(super) fn store_url(chosen: Option<&str>, cell: &Cell) -> Result<String, StoreError> {
+    match chosen.or(cell.store.url.as_deref()) {
+        Some(url) => Ok(url.to_owned()),
+        None => default_url(&cell.name),
+    }
+}
+
+/// Opens the store, records that the run begins, and reads the library.
+fn open_store(chosen: Option<&str>, cell: &Cell, record: &RunRecord) -> Result<(Store, Library), StoreError> {
+    let store = Store::open(&store_url(chosen, cell)?)?;
+    store.seed(&cell.strategies)?;
+    store.begin(record)?;
+    let library = store.library()?;
+    Ok((store, library))
+}
+
+/// A run is named after the instant it began; two in one nanosecond have different processes.
+fn record(args: &RunArgs, cell: &Cell) -> RunRecord {
+    let since_epoch = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let started_ns = i64::try_from(since_epoch.as_nanos()).unwrap_or(i64::MAX);
+    RunRecord {
+        id: format!("{started_ns:x}-{:x}", std::process::id()),
+        cell: cell.name.clone(),
+        product: cell.product.name.clone(),
+        config_hash: cell.hash,
+        seed: args.seed,
+        boxes: args.boxes,
+        started_ns,
+    }
+}
+
+fn lockstep(
+    cell: &Cell,
+    store: &mut Store,
+    library: Library,
+    options: RunOptions,
+    on_event: &mut dyn FnMut(&Event),
+) -> Result<Ended, String> {
+    let mut sim = SimCell::new(cell, library, options).map_err(|error| error.to_string())?;
+    signals::listen().map_err(|error| format!("signals cannot be handled: {error}"))?;
+    let outcome = loop {
+        let ended = sim.run(store, on_event, |_| signals::asked() > 0).map_err(|error| error.to_string())?;
+        match ended {
+            Some(outcome) => break outcome,
+            None => sim.halt(),
+        }
+    };
+    Ok(Ended { outcome, summary: sim.summary() })
+}
+
+fn live(
+    cell: &Cell,
+    product: Option<&str>,
+    store: &mut Store,
+    library: Library,
+    options: RunOptions,
+    on_event: &mut dyn FnMut(&Event),
+) -> Result<Ended, String> {
+    let ended = live::run(cell, product, library, store, options, on_event).map_err(|error| error.to_string())?;
+    Ok(Ended { outcome: ended.outcome, summary: ended.summary })
+}
+
+/// Prints the summary: the last line of `--json`, or a table.
+fn report(args: &RunArgs, ended: &Ended, wall_time_s: f64, run: &str, store: &Store) {
+    let Ended { outcome, summary } = ended;
+    if args.json {
+        let mut line = serde_json::to_value(summary).unwrap_or_default();
+        line["event"] = json!("summary");
+        line["outcome"] = json!(outcome.name());
+        line["wall_time_s"] = json!(wall_time_s);
+        anstream::println!("{line}");
+    } else {
+        anstream::println!("\n{}", table(summary, wall_time_s));
+    }
+    if *outcome != Outcome::Completed {
+        anstream::eprintln!("{outcome}");
+    }
+    anstream::eprintln!("journal: `tandem journal show {run}` (in {})", store.shown_url());
+}
+
+fn table(summary: &Summary, wall_time_s: f64) -> Table {
+    let clearance = summary.min_clearance_m.map_or("the arm did not move".to_owned(), |m| format!("{:.0} mm", m * 1e3));
+    let rows = [
+        ("boxes completed", format!("{} of {}", summary.boxes_completed, summary.boxes_requested)),
+        ("steps done", summary.steps_done.to_string()),
+        ("attempts failed", summary.steps_failed.to_string()),
+        ("protective stops", summary.stops.to_string()),
+        ("contacts", summary.contacts.to_string()),
+        ("smallest clearance", clearance),
+        ("cell time", format!("{:.1} s", summary.sim_time_s)),
+        ("wall time", format!("{wall_time_s:.1} s ({:.0}x)", summary.sim_time_s / wall_time_s)),
+        ("seed", summary.seed.to_string()),
+    ];
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header(["product", summary.product.as_str()]);
+    for (name, value) in rows {
+        table.add_row([name.to_owned(), value]);
+    }
+    table
+}
+
+fn exit_code(outcome: &Outcome) -> u8 {
+    match outcome {
+        Outcome::Completed => exit::OK,
+        Outcome::Failed { .. } => exit::FAILED,
+        Outcome::Interrupted => exit::INTERRUPTED,
+        Outcome::Fault { .. } => exit::FAULT,
+        Outcome::TimedOut { .. } => exit::TIMED_OUT,
+    }
+}

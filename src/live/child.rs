@@ -1,0 +1,92 @@
+//! The main of a role's process.
+
+use std::error::Error;
+use std::path::PathBuf;
+use std::time::Duration;
+
+use tandem_bus::{Identity, Instance, Node};
+use tandem_config::Cell;
+use tandem_controller::Controller;
+use tandem_msg::{Coded, Role};
+
+use super::shell::{Leaving, Shell};
+use super::{LiveError, rundir, signals};
+use crate::perception::Perception;
+use crate::plant::Plant;
+use crate::roles::{ControllerRole, PerceptionRole, PlantRole, service};
+
+/// The roles that are processes of their own.
+pub(super) const CHILDREN: [Role; 3] = [Role::Plant, Role::Perception, Role::Controller];
+/// How long a process tries to join the bus.
+pub(super) const JOINING: Duration = Duration::from_secs(5);
+
+/// What a role's process is started with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RoleArgs {
+    /// Which role.
+    pub role: Role,
+    /// The cell file.
+    pub cell: PathBuf,
+    /// The product, when the user named one.
+    pub product: Option<String>,
+    /// The run directory of the cell, whose last component names the instance.
+    pub instance: PathBuf,
+    /// The incarnation.
+    pub epoch: u64,
+    /// The run's seed.
+    pub seed: u64,
+}
+
+/// Runs one role until SIGTERM, or until its supervisor is gone.
+///
+/// # Errors
+/// A file, parameter or model is refused, or the bus cannot be joined.
+pub fn role(args: &RoleArgs) -> Result<(), LiveError> {
+    signals::listen().map_err(LiveError::Signals)?;
+    let cell = Cell::load(&args.cell, args.product.as_deref()).map_err(LiveError::Config)?;
+    let instance = rundir::instance_at(&args.instance)?;
+    let left = match args.role {
+        Role::Plant => plant(args, &cell, &instance),
+        Role::Perception => perception(args, &cell, &instance),
+        Role::Controller => controller(args, &cell, &instance),
+        Role::Supervisor => Err(LiveError::NoSuchRole),
+    }?;
+    match left {
+        Leaving::Asked | Leaving::Orphaned => Ok(()),
+    }
+}
+
+fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {
+    let plant = Plant::new(cell, args.seed).map_err(refused(Role::Plant))?;
+    let node = join(args.role, args.epoch, cell, instance)?;
+    let mut role = PlantRole::open(&node, plant)?;
+    let shell = Shell::new(cell, args.role, node.publisher(&service::stats(args.role))?)?;
+    Ok(shell.run(|now| role.cycle(now)))
+}
+
+fn perception(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {
+    let perception = Perception::load(&cell.perception.model).map_err(refused(Role::Perception))?;
+    let node = join(args.role, args.epoch, cell, instance)?;
+    let mut role = PerceptionRole::open(&node, perception)?;
+    let shell = Shell::new(cell, args.role, node.publisher(&service::stats(args.role))?)?;
+    Ok(shell.run(|now| role.cycle(now)))
+}
+
+fn controller(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {
+    let controller = Controller::new(cell.robot.chain, cell.robot.body, cell.controller);
+    let controller = controller.map_err(refused(Role::Controller))?;
+    let node = join(args.role, args.epoch, cell, instance)?;
+    let mut role = ControllerRole::open(&node, controller)?;
+    let shell = Shell::new(cell, args.role, node.publisher(&service::stats(args.role))?)?;
+    Ok(shell.run(|now| role.cycle(now)))
+}
+
+/// A place on the bus for one incarnation of a role.
+pub(super) fn join(role: Role, epoch: u64, cell: &Cell, instance: &Instance) -> Result<Node, LiveError> {
+    let identity = Identity { role: role.name().to_owned(), epoch, config_hash: cell.hash };
+    Ok(Node::open(instance, identity, JOINING)?)
+}
+
+fn refused<E: Into<Box<dyn Error + Send + Sync>>>(role: Role) -> impl FnOnce(E) -> LiveError {
+    move |cause| LiveError::Build { role, cause: cause.into() }
+}

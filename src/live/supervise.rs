@@ -1,0 +1,137 @@
+//! The supervisor's loop: hears of its roles, runs the supervisor role, brings the run to its end.
+
+use std::sync::mpsc;
+use std::time::Duration;
+
+use tandem_bus::{Instance, Node, Write as _};
+use tandem_config::Cell;
+use tandem_cycle::{FixedRate, Monotonic};
+use tandem_msg::{Role, RoleStats, Stamp};
+
+use super::child::{CHILDREN, join};
+use super::journal::Journal;
+use super::rollcall::RollCall;
+use super::warden::{Orders, Report};
+use super::{LiveError, shell, signals};
+use crate::roles::{SupervisorRole, Surroundings, service};
+use crate::supervisor::{Event, Outcome, Summary, Supervisor};
+
+/// A measured state older than this does not say that the arm stands.
+const FRESH: Duration = Duration::from_millis(250);
+/// From the wish to end until the arm stands.
+const STANDING: Duration = Duration::from_secs(3);
+/// From the wish to end until the journal is durable.
+const SETTLING: Duration = Duration::from_secs(10);
+/// From a fault nobody can mend, or a signal, until the supervisor role has ended the run by itself.
+const YIELDING: Duration = Duration::from_secs(8);
+/// A joint slower than this stands, rad/s: the noise of a velocity sensor.
+const STANDSTILL: f64 = 0.01;
+
+/// How a live run ended.
+#[derive(Clone, Debug)]
+pub struct Ended {
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Its numbers.
+    pub summary: Summary,
+    /// Time on the cell's clock since the loop began, seconds.
+    pub time_s: f64,
+    /// Health of each loop at the end, by role code.
+    pub loops: [RoleStats; 4],
+    /// Role processes that had to be started anew.
+    pub restarts: u32,
+}
+
+/// What the supervisor's thread works with.
+pub(super) struct Watch<'a> {
+    pub(super) cell: &'a Cell,
+    pub(super) instance: &'a Instance,
+    pub(super) reports: mpsc::Receiver<Report>,
+    pub(super) orders: &'a Orders,
+    pub(super) journal: Journal,
+    pub(super) events: mpsc::Sender<Event>,
+}
+
+/// What has been decided about the end, and since when.
+#[derive(Clone, Debug)]
+struct Ending {
+    outcome: Outcome,
+    since: Stamp,
+}
+
+impl Watch<'_> {
+    /// Runs until the end.
+    pub(super) fn run(mut self, supervisor: Supervisor) -> Result<Ended, LiveError> {
+        let node = join(Role::Supervisor, 1, self.cell, self.instance)?;
+        let mut role = SupervisorRole::open(&node, supervisor)?;
+        let mut own_stats = node.publisher(&service::stats(Role::Supervisor))?;
+        let [plant, perception, controller] = CHILDREN;
+        let stats = |role| node.latest(&service::stats(role));
+        let stats = [stats(plant)?, stats(perception)?, stats(controller)?];
+        let mut roles = RollCall::new(stats, self.cell);
+
+        let granted = shell::granted(self.cell, Role::Supervisor)?;
+        shell::tell(Role::Supervisor, &granted);
+        let grid = shell::grid(self.cell.timing.of(Role::Supervisor), Role::Supervisor)?;
+        let mut rate = FixedRate::new(grid, Monotonic);
+        let mut start = None;
+        let mut asked_since = None;
+        let mut ending: Option<Ending> = None;
+        loop {
+            let now = rate.wait().now;
+            let start = *start.get_or_insert(now);
+            roles.call(now, &self.reports, &role.heard(), self.orders);
+            if let Some(error) = roles.failed_to_start() {
+                return Err(error);
+            }
+            if signals::asked() > 0 {
+                asked_since.get_or_insert(now);
+            }
+            let around = Surroundings {
+                roles: roles.surroundings(),
+                journal_committed: self.journal.durable(),
+                halt: asked_since.is_some() || ending.is_some(),
+            };
+            let outputs = role.cycle(now, &around);
+            for event in outputs.events.drain(..) {
+                // Without a listener the run goes on all the same.
+                let _ = self.events.send(event);
+            }
+            self.journal.write(std::mem::take(&mut outputs.journal));
+            if let Some(outcome) = outputs.finished.take() {
+                ending.get_or_insert(Ending { outcome, since: now });
+            } else if ending.is_none() {
+                ending = overdue(now, asked_since, &roles).map(|outcome| Ending { outcome, since: now });
+            }
+            let _ = own_stats.publish(now, &shell::stats(Role::Supervisor, &rate, &granted));
+            if let Some(end) = &ending
+                && self.may_leave(now, end, &role)
+            {
+                let loops = roles.loops(shell::stats(Role::Supervisor, &rate, &granted));
+                let time_s = now.as_secs_f64() - start.as_secs_f64();
+                let summary = role.summary();
+                return Ok(Ended { outcome: end.outcome.clone(), summary, time_s, loops, restarts: roles.restarts() });
+            }
+        }
+    }
+
+    /// Whether the arm stands and the journal is durable, or they have had their time.
+    fn may_leave(&self, now: Stamp, end: &Ending, role: &SupervisorRole<Node>) -> bool {
+        let waited = end.since.age_at(now);
+        let arm = role.arm();
+        let fresh = arm.header.heard() && arm.header.stamp.age_at(now) < FRESH;
+        let stands = fresh && arm.velocity.iter().all(|velocity| velocity.abs() < STANDSTILL);
+        let settled = self.journal.is_settled();
+        // The second signal is for those who cannot wait.
+        (stands || waited >= STANDING) && (settled || waited >= SETTLING) || signals::asked() > 1
+    }
+}
+
+/// The outcome the shell decides on when the supervisor role has not, in its time.
+fn overdue(now: Stamp, asked_since: Option<Stamp>, roles: &RollCall) -> Option<Outcome> {
+    if signals::asked() > 1 || asked_since.is_some_and(|since| since.age_at(now) > YIELDING) {
+        return Some(Outcome::Interrupted);
+    }
+    let (role, fault, since) = roles.gone()?;
+    (since.age_at(now) > YIELDING).then_some(Outcome::Fault { role, fault })
+}

@@ -1,0 +1,21 @@
+CREATE TABLE step_journal (
+    serial VARCHAR(128) NOT NULL,
+    step BIGINT NOT NULL,
+    attempt BIGINT NOT NULL,
+    run VARCHAR(64) NOT NULL,
+    seq BIGINT NOT NULL,
+    part VARCHAR(64) NOT NULL,
+    state VARCHAR(16) NOT NULL,
+    time_s DOUBLE NOT NULL,
+    duration_s DOUBLE NOT NULL,
+    subject VARCHAR(16) NOT NULL,
+    class VARCHAR(32) NOT NULL,
+    confidence DOUBLE NOT NULL,
+    mode VARCHAR(32) NOT NULL,
+    tool VARCHAR(32) NOT NULL,
+    form VARCHAR(16) NOT NULL,
+    strategy VARCHAR(128) NOT NULL,
+    clearance_min_m DOUBLE,
+    remark TEXT NOT NULL,
+    PRIMARY KEY (serial, step, attempt)
+)

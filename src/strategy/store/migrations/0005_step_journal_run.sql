@@ -1,0 +1,1 @@
+CREATE INDEX step_journal_run ON step_journal (run, seq)
