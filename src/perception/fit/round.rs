@@ -133,7 +133,9 @@ fn guess(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<Wall> {
     for _ in 0..if cone { 3 * CIRCLES } else { CIRCLES } {
         let first = rng.random_range(0..=count - slice);
         let [a, b, c] = [0; 3].map(|_| voters[first + rng.random_range(0..slice)]);
-        let Some((centre, radius)) = through(a.xy(), b.xy(), c.xy()) else { continue };
+        let Some((centre, radius)) = through(a.xy(), b.xy(), c.xy()) else {
+            continue;
+        };
         if radius > 1.2 * widest || radius < 0.05 * widest {
             continue;
         }
