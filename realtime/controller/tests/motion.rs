@@ -128,10 +128,13 @@ fn a_contact_can_be_left() {
     stranded.assert_limits();
 }
 
+/// What goes wrong, what it is called, and how it is brought about.
+type Case = (&'static str, MotionFailure, fn(&mut Cell) -> MotionTask);
+
 /// Each way a task can fail has its name, and the arm stays where it can go on from.
 #[test]
 fn failures_are_named() {
-    let cases: [(&str, MotionFailure, fn(&mut Cell) -> MotionTask); 8] = [
+    let cases: [Case; 8] = [
         ("beyond reach", MotionFailure::Unreachable, |_| task(1, down(2.0, 0.0, 0.3, 0.0))),
         ("inside the bench", MotionFailure::NoClearPath, |_| task(1, down(0.6, 0.3, -0.05, 0.0))),
         ("not a number", MotionFailure::InvalidTask, |_| task(1, down(f64::NAN, 0.0, 0.3, 0.0))),

@@ -243,8 +243,8 @@ fn every_fault_stops_latches_and_can_be_reset() {
         (fault.end)(&mut cell);
         cell.run(500);
         assert_eq!((cell.stop(), cell.cause()), (StopState::Stopped, fault.cause), "{what}: latched");
-        for joint in 0..6 {
-            assert!((cell.arm.position[joint] - at[joint]).abs() < 0.11, "{what}: joint {joint} stays");
+        for (joint, (now, then)) in cell.arm.position.iter().zip(&at).enumerate() {
+            assert!((now - then).abs() < 0.11, "{what}: joint {joint} stays");
         }
         cell.task.reset_count += 1;
         cell.until(what, 50, |cell| cell.stop() == StopState::Running);
