@@ -231,6 +231,31 @@ fn pause_and_halt_stop_and_run_goes_on() {
     }
 }
 
+/// On the approach and on the withdrawal the TCP stays on its line and keeps its direction.
+#[test]
+fn straight_stretches_are_straight() {
+    let mut cell = Cell::new();
+    let goal = down(0.55, -0.30, 0.15, 0.7);
+    let mut there = task(1, goal);
+    there.approach = 0.20;
+    there.retract = 0.25;
+    there.action = Code::of(EffectorAction::Screw);
+    cell.give(there);
+    let (mut off, mut turned, mut samples) = (0.0_f64, 0.0_f64, 0);
+    while cell.phase() != MotionPhase::Done {
+        cell.step();
+        if matches!(cell.phase(), MotionPhase::Approach | MotionPhase::Retract) {
+            let tcp = cell.tcp();
+            off = off.max((tcp.translation.vector.xy() - nalgebra::Vector2::new(0.55, -0.30)).norm());
+            turned = turned.max((tcp.rotation * nalgebra::Vector3::z() + nalgebra::Vector3::z()).norm());
+            samples += 1;
+        }
+        assert!(cell.cycle < 20_000, "{:#?}", cell.status());
+    }
+    assert!(samples > 500 && off < 5e-5 && turned < 2e-4, "{samples} samples, {off} m off, {turned} rad turned");
+    cell.assert_limits();
+}
+
 /// The share of speed that a task asks for is kept.
 #[test]
 fn a_slow_task_is_slow() {

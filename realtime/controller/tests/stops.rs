@@ -263,10 +263,7 @@ fn every_fault_stops_latches_and_can_be_reset() {
 fn a_reset_does_not_override_a_cause() {
     for fault in faults().into_iter().filter(|fault| {
         // These are events, over as soon as the arm stands: there is nothing left to refuse a reset for.
-        !matches!(
-            fault.cause,
-            StopCause::TrackingError | StopCause::PlantBraked | StopCause::Clearance | StopCause::Separation
-        )
+        !matches!(fault.cause, StopCause::TrackingError | StopCause::PlantBraked | StopCause::Clearance)
     }) {
         let mut cell = under_way();
         (fault.begin)(&mut cell);
