@@ -86,6 +86,16 @@ impl Library {
         &self.rows
     }
 
+    /// How many rows there are.
+    pub fn len(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
     /// The strategy that fits best.
     ///
     /// # Errors

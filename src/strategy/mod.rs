@@ -12,5 +12,7 @@ mod reference;
 pub mod store;
 
 pub use journal::{JournalEntry, StepState};
+#[cfg(test)]
+pub(crate) use library::tests as library_tests;
 pub use library::{Library, Match, NoMatch, Situation};
 pub use reference::{Joining, Seen, join};

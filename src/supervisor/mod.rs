@@ -27,6 +27,8 @@ mod look;
 mod placing;
 mod role;
 mod step;
+#[cfg(test)]
+mod tests;
 mod watch;
 
 pub use capability::{Demand, Margins, Reason, Verdict, judge};
@@ -58,6 +60,8 @@ pub enum RoleFault {
     Exited,
     /// Lives, but has not been heard within its limit.
     Silent,
+    /// Lives, but was never ready.
+    Unresponsive,
     /// Could not be started again.
     Unstartable,
 }
@@ -69,6 +73,7 @@ impl RoleFault {
             Self::Killed => "killed",
             Self::Exited => "exited",
             Self::Silent => "silent",
+            Self::Unresponsive => "unresponsive",
             Self::Unstartable => "unstartable",
         }
     }

@@ -428,6 +428,10 @@ impl Controller {
         if self.refused {
             causes.add(StopCause::Internal);
         }
+        if self.stop.cause() == StopCause::Separation && !self.governor.enough() {
+            // The cause lasts until there is room to start again, not only until the arm stands.
+            causes.add(StopCause::Separation);
+        }
         let before = self.stop.state();
         let cause = self.stop.cause();
         let state = self.stop.update(
