@@ -84,7 +84,15 @@ fn list(store: &Store, json: bool) -> Result<(), StoreError> {
         return Ok(());
     }
     let mut table = Table::new();
-    table.load_style(presets::NOTHING).set_header(["run", "cell", "product", "boxes", "seed", "configuration", "outcome"]);
+    table.load_style(presets::NOTHING).set_header([
+        "run",
+        "cell",
+        "product",
+        "boxes",
+        "seed",
+        "configuration",
+        "outcome",
+    ]);
     for PastRun { record, outcome } in &runs {
         table.add_row([
             record.id.clone(),

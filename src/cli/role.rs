@@ -43,7 +43,7 @@ pub(super) fn role(args: &RoleArgs) -> u8 {
         Ok(()) => exit::OK,
         Err(error) => {
             anstream::eprintln!("{error}");
-            exit::FAILED
+            error.exit_code()
         }
     }
 }

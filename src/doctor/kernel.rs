@@ -15,7 +15,9 @@ pub(super) fn preemption(host: &Host) -> Check {
     let model = match dynamic.as_deref() {
         _ if realtime => "realtime",
         Some(model) => model,
-        None if version.contains("PREEMPT_DYNAMIC") => "dynamic, the model in force is not shown (mount debugfs, be root)",
+        None if version.contains("PREEMPT_DYNAMIC") => {
+            "dynamic, the model in force is not shown (mount debugfs, be root)"
+        }
         None if version.contains("PREEMPT") => "full",
         None => "none",
     };

@@ -9,9 +9,9 @@ use std::time::Duration;
 
 use rustix::process::{Pid, getppid};
 use tandem_bus::{Publisher, Write as _};
+use tandem_config::{Cell, Policy, Schedule};
 use tandem_cycle::setup::{self, Granted, Wish};
 use tandem_cycle::{FixedRate, Grid, Monotonic};
-use tandem_config::{Cell, Policy, Schedule};
 use tandem_msg::{Coded, Role, RoleStats, Stamp};
 
 use super::{LiveError, signals};

@@ -1,4 +1,4 @@
-//! SIGINT, SIGTERM and SIGHUP: counted, and looked at by the loops.
+//! SIGINT, SIGTERM and SIGHUP: counted, and looked at by the loops of every shell.
 
 #![allow(unsafe_code)]
 

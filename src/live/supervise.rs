@@ -34,8 +34,6 @@ pub struct Ended {
     pub outcome: Outcome,
     /// Its numbers.
     pub summary: Summary,
-    /// Time on the cell's clock since the loop began, seconds.
-    pub time_s: f64,
     /// Health of each loop at the end, by role code.
     pub loops: [RoleStats; 4],
     /// Role processes that had to be started anew.
@@ -74,12 +72,10 @@ impl Watch<'_> {
         shell::tell(Role::Supervisor, &granted);
         let grid = shell::grid(self.cell.timing.of(Role::Supervisor), Role::Supervisor)?;
         let mut rate = FixedRate::new(grid, Monotonic);
-        let mut start = None;
         let mut asked_since = None;
         let mut ending: Option<Ending> = None;
         loop {
             let now = rate.wait().now;
-            let start = *start.get_or_insert(now);
             roles.call(now, &self.reports, &role.heard(), self.orders);
             if let Some(error) = roles.failed_to_start() {
                 return Err(error);
@@ -108,9 +104,8 @@ impl Watch<'_> {
                 && self.may_leave(now, end, &role)
             {
                 let loops = roles.loops(shell::stats(Role::Supervisor, &rate, &granted));
-                let time_s = now.as_secs_f64() - start.as_secs_f64();
                 let summary = role.summary();
-                return Ok(Ended { outcome: end.outcome.clone(), summary, time_s, loops, restarts: roles.restarts() });
+                return Ok(Ended { outcome: end.outcome.clone(), summary, loops, restarts: roles.restarts() });
             }
         }
     }

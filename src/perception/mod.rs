@@ -84,11 +84,15 @@ impl Perception {
             recognition: Code::of(Recognition::NoPart),
             ..Feature::default()
         };
-        let Some(points) = cloud.points.get(..cloud.point_count as usize) else { return };
+        let Some(points) = cloud.points.get(..cloud.point_count as usize) else {
+            return;
+        };
         if !cloud.base_from_camera.is_valid() || !sound(points) {
             return;
         }
-        let Some(recognised) = self.recognise(points) else { return };
+        let Some(recognised) = self.recognise(points) else {
+            return;
+        };
         let sure = f64::from(recognised.probabilities[recognised.class.code() as usize]) >= self.card().threshold;
         feature.recognition = Code::of(match recognised.fit {
             Some(_) if sure => Recognition::Sure,

@@ -175,7 +175,9 @@ impl Stored {
         let expected = format!("f32 {shape:?}, finite");
         let found = match self.tensors.get(name) {
             None => "missing".to_owned(),
-            Some(t) if t.dims() != shape || t.dtype() != DType::F32 => format!("{} {:?}", t.dtype().as_str(), t.dims()),
+            Some(t) if t.dims() != shape || t.dtype() != DType::F32 => {
+                format!("{} {:?}", t.dtype().as_str(), t.dims())
+            }
             Some(t) => {
                 if t.flatten_all()?.to_vec1::<f32>()?.iter().all(|v| v.is_finite()) {
                     return Ok(t.clone());

@@ -168,7 +168,9 @@ impl Camera {
             let scale = 1.0 / (1.0 + across[0] * across[0] + across[1] * across[1]).sqrt();
             let ray = [across[0] * scale, across[1] * scale, scale];
             let along = rotation.map(|r| r[0] * ray[0] + r[1] * ray[1] + r[2] * ray[2]);
-            let Some(range) = view.trace(origin, along, near, far) else { continue };
+            let Some(range) = view.trace(origin, along, near, far) else {
+                continue;
+            };
 
             let at = |t: f32| [0, 1, 2].map(|i| origin[i] + t * along[i]);
             let hit = at(range);

@@ -39,6 +39,7 @@ mod human;
 mod model;
 mod parts;
 mod referee;
+mod rest;
 pub mod solid;
 mod station;
 
@@ -53,6 +54,7 @@ use human::{Person, Sight, Tracker};
 use model::PlantModel;
 use parts::Parts;
 use referee::{Look, Referee};
+use rest::Rest;
 use station::Feeder;
 
 /// What the plant hears in a cycle: the latest of each.
@@ -97,6 +99,7 @@ pub struct Plant {
     joint_noise: f64,
     period: Duration,
     loaded: Option<usize>,
+    rest: Rest,
     base_from_tcp: Isometry3<f64>,
 }
 
@@ -158,6 +161,7 @@ impl Plant {
             joint_noise: model.joint_noise,
             period: model.period,
             loaded: None,
+            rest: Rest::default(),
             world,
             arm,
             drive,
@@ -209,9 +213,13 @@ impl Plant {
 
     fn move_arm(&mut self, now: Stamp, dt: f64, command: &JointCommand, outputs: &mut PlantOutputs) {
         let set_point = self.drive.cycle(now, dt, command, &self.arm.measured().position);
-        self.arm.drive(&mut self.world, &set_point.position, &set_point.velocity);
-        self.world.step();
-        self.arm.read(&self.world, dt);
+        let disturbed = self.arm.drive(&mut self.world, &set_point.position, &set_point.velocity);
+        if self.rest.asleep(disturbed || self.parts.falling(&self.world), self.arm.measured()) {
+            self.arm.stand();
+        } else {
+            self.world.step();
+            self.arm.read(&self.world, dt);
+        }
 
         let measured = self.arm.measured();
         let count = self.arm.joint_count();
@@ -236,6 +244,7 @@ impl Plant {
             self.loaded = self.parts.held();
             let load = self.parts.load(self.arm.flange_from_tcp());
             self.arm.set_load(&mut self.world, load);
+            self.rest.wake();
         }
     }
 

@@ -21,8 +21,11 @@ fn a_box_is_assembled_whatever_the_seed() {
         assert_eq!(summary.contacts, 0, "seed {seed}: {summary:?}");
         assert!(summary.min_clearance_m.is_some_and(|clearance| clearance > 0.0), "seed {seed}: {summary:?}");
         let journal = rig.journal();
-        let finished: BTreeSet<u32> =
-            journal.iter().filter(|entry| entry.state != StepState::Started && entry.state != StepState::Failed).map(|entry| entry.step).collect();
+        let finished: BTreeSet<u32> = journal
+            .iter()
+            .filter(|entry| entry.state != StepState::Started && entry.state != StepState::Failed)
+            .map(|entry| entry.step)
+            .collect();
         assert_eq!(finished.len(), steps, "seed {seed}: {journal:?}");
     }
 }

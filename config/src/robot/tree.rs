@@ -46,6 +46,11 @@ impl Tree {
         let roots: Vec<usize> = (0..urdf.links.len()).filter(|link| parents[*link].is_none()).collect();
         let [root] = roots[..] else { return Err(vec![root_fault(source, urdf, &roots)]) };
 
+        if let Some(name) = on_a_loop(urdf, &parents) {
+            let advice = "let the joints run outwards from one base";
+            return Err(vec![source.fault_in("link", name, "", "", "on a loop of joints", "a chain", advice)]);
+        }
+
         let tcp = tcp_link(source, urdf, &links, tcp)?;
         // From the TCP back to the root.
         let mut way = Vec::new();
@@ -53,11 +58,6 @@ impl Tree {
         while let Some((joint, parent)) = parents[at] {
             way.push(joint);
             at = parent;
-            if way.len() > urdf.joints.len() {
-                let name = &urdf.links[tcp].name;
-                let advice = "let the joints run outwards from one base";
-                return Err(vec![source.fault_in("link", name, "", "", "on a loop of joints", "a chain", advice)]);
-            }
         }
         way.reverse();
         let moves = |joint: &usize| urdf.joints[*joint].joint_type != JointType::Fixed;
@@ -85,11 +85,8 @@ impl Tree {
         tree.chain.sort_by_key(|joint| moving.iter().position(|other| *other == joint.index));
         let last_own = moving.last().map(|joint| urdf.joints[*joint].child.link.as_str());
         for (index, place) in placed.iter().enumerate() {
-            let Some((link, link_from_member)) = *place else {
-                let advice = "let the joints run outwards from one base";
-                let name = &urdf.links[index].name;
-                return Err(vec![source.fault_in("link", name, "", "", "on a loop of joints", "a chain", advice)]);
-            };
+            // Every link was placed: none is on a loop.
+            let Some((link, link_from_member)) = *place else { continue };
             let tool = link == moving.len() && last_own != Some(urdf.links[index].name.as_str());
             tree.members.push(Member { index, link, link_from_member, tool });
         }
@@ -147,6 +144,21 @@ fn parents(
         }
     }
     if faults.is_empty() { Ok(parents) } else { Err(faults) }
+}
+
+/// The first link from which the way back never comes to a root.
+fn on_a_loop<'u>(urdf: &'u urdf_rs::Robot, parents: &[Option<(usize, usize)>]) -> Option<&'u str> {
+    let ends = |link: &usize| {
+        let mut at = *link;
+        (0..=parents.len()).any(|_| match parents[at] {
+            Some((_, parent)) => {
+                at = parent;
+                false
+            }
+            None => true,
+        })
+    };
+    (0..parents.len()).find(|link| !ends(link)).map(|link| urdf.links[link].name.as_str())
 }
 
 fn root_fault(source: &Source, urdf: &urdf_rs::Robot, roots: &[usize]) -> Fault {

@@ -188,7 +188,7 @@ impl Monitor {
     pub fn is_clear(&self, poses: &LinkPoses, margin: f64) -> bool {
         match self.place(poses) {
             Some(arm) if self.scene_valid && margin.is_finite() => {
-                self.nearest(&arm, margin + f64::EPSILON, margin).distance > margin
+                self.nearest(&arm, margin.next_up(), margin).distance > margin
             }
             _ => false,
         }

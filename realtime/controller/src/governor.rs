@@ -127,6 +127,11 @@ impl Governor {
         self.record(now, enough);
     }
 
+    /// Whether there was room for an arm at rest to start, when last asked.
+    pub(crate) fn enough(&self) -> bool {
+        self.enough_since.is_some()
+    }
+
     fn record(&mut self, now: Stamp, enough: bool) {
         self.enough_since = if enough { self.enough_since.or(Some(now)) } else { None };
     }

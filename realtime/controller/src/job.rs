@@ -69,7 +69,9 @@ impl Job {
             (_, true) => Stage::Planning { begun: false },
             (_, false) => Stage::Ended { failure: MotionFailure::InvalidTask, at: now },
         };
-        Self { task: *task, stage, began: now, touch_before: self.task.touch, ..Self::none() }
+        // No task in between changes nothing about where the arm stands.
+        let touch_before = if self.task.id == 0 { self.touch_before } else { self.task.touch };
+        Self { task: *task, stage, began: now, touch_before, ..Self::none() }
     }
 
     /// What the tool carries at this stage.

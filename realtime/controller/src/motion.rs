@@ -28,6 +28,7 @@ pub(crate) struct SetPoint {
 }
 
 #[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is one of it, in place; a box would be heap")]
 enum Mode {
     Slack { since: Stamp },
     Slowing { trajectory: Trajectory<JOINTS_MAX>, time: f64 },

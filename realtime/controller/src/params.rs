@@ -1,5 +1,6 @@
 //! Parameters of the role, and the range of every one of them.
 
+use core::f64::consts::TAU;
 use core::fmt;
 use core::time::Duration;
 
@@ -196,7 +197,7 @@ impl Params {
         value("supervisor_age_max", ms(self.supervisor_age_max), ms(self.period), 2_000.0, "ms");
         value("engage_timeout", ms(self.engage_timeout), 10.0, 60_000.0, "ms");
         for position in self.home {
-            value("home", position, -6.2832, 6.2832, "rad");
+            value("home", position, -TAU, TAU, "rad");
         }
         value("tracking_error_max", self.tracking_error_max, 0.001, 0.5, "rad");
         value("joint_limit_tolerance", self.joint_limit_tolerance, 0.0, 0.2, "rad");

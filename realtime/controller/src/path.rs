@@ -109,7 +109,7 @@ impl Path {
 
     /// The point at a length; outside 0..=length the nearer end.
     pub(crate) fn at(&self, length: f64) -> PathPoint {
-        if self.length <= 0.0 {
+        if !(self.length > 0.0) {
             return PathPoint { position: self.nodes[0], ..PathPoint::default() };
         }
         let h = self.spacing();

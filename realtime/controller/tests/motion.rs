@@ -128,10 +128,13 @@ fn a_contact_can_be_left() {
     stranded.assert_limits();
 }
 
+/// What goes wrong, what it is called, and how it is brought about.
+type Case = (&'static str, MotionFailure, fn(&mut Cell) -> MotionTask);
+
 /// Each way a task can fail has its name, and the arm stays where it can go on from.
 #[test]
 fn failures_are_named() {
-    let cases: [(&str, MotionFailure, fn(&mut Cell) -> MotionTask); 8] = [
+    let cases: [Case; 8] = [
         ("beyond reach", MotionFailure::Unreachable, |_| task(1, down(2.0, 0.0, 0.3, 0.0))),
         ("inside the bench", MotionFailure::NoClearPath, |_| task(1, down(0.6, 0.3, -0.05, 0.0))),
         ("not a number", MotionFailure::InvalidTask, |_| task(1, down(f64::NAN, 0.0, 0.3, 0.0))),
@@ -226,6 +229,31 @@ fn pause_and_halt_stop_and_run_goes_on() {
         assert_at(&cell, &goal);
         cell.assert_limits();
     }
+}
+
+/// On the approach and on the withdrawal the TCP stays on its line and keeps its direction.
+#[test]
+fn straight_stretches_are_straight() {
+    let mut cell = Cell::new();
+    let goal = down(0.55, -0.30, 0.15, 0.7);
+    let mut there = task(1, goal);
+    there.approach = 0.20;
+    there.retract = 0.25;
+    there.action = Code::of(EffectorAction::Screw);
+    cell.give(there);
+    let (mut off, mut turned, mut samples) = (0.0_f64, 0.0_f64, 0);
+    while cell.phase() != MotionPhase::Done {
+        cell.step();
+        if matches!(cell.phase(), MotionPhase::Approach | MotionPhase::Retract) {
+            let tcp = cell.tcp();
+            off = off.max((tcp.translation.vector.xy() - nalgebra::Vector2::new(0.55, -0.30)).norm());
+            turned = turned.max((tcp.rotation * nalgebra::Vector3::z() + nalgebra::Vector3::z()).norm());
+            samples += 1;
+        }
+        assert!(cell.cycle < 20_000, "{:#?}", cell.status());
+    }
+    assert!(samples > 500 && off < 5e-5 && turned < 2e-4, "{samples} samples, {off} m off, {turned} rad turned");
+    cell.assert_limits();
 }
 
 /// The share of speed that a task asks for is kept.

@@ -60,7 +60,7 @@ fn a_person_who_appears_is_a_protective_stop() {
     cell.until("stopped", 500, |cell| cell.stop() == StopState::Stopped);
     assert!(cell.findings.separation_moving_min > 0.0);
     cell.run(1_000);
-    assert_eq!(cell.status().standstill, 1);
+    assert_eq!((cell.stop(), cell.status().standstill), (StopState::Stopped, 1), "they are still there");
     cell.human.capsule_count = 0;
     cell.until("done", 10_000, |cell| cell.phase() == MotionPhase::Done);
     assert_eq!(cell.status().stop_count, 1);

@@ -167,3 +167,57 @@ fn what_is_not_finite_shows() {
     }
     assert!(chain.forward(&[0.3; JOINTS_MAX]).is_finite());
 }
+
+/// An arm on a rail has more joints than the task needs: still every pose it can take is solved, within
+/// limits, and the same question gets the same answer.
+#[test]
+fn an_arm_on_a_rail_is_solved() {
+    let arm = chain("panda");
+    let rail = Joint {
+        kind: JointKind::Prismatic,
+        parent_from_joint: Isometry3::identity(),
+        axis: Vector3::x_axis(),
+        position_min: -0.5,
+        position_max: 0.5,
+        velocity_max: 1.0,
+        acceleration_max: 2.0,
+        jerk_max: 20.0,
+        effort_max: 500.0,
+    };
+    let joints: Vec<Joint> = [rail].into_iter().chain(arm.joints().iter().copied()).collect();
+    let chain = Chain::new(&joints, *arm.tool()).expect("eight joints are a chain");
+    let seed = [0.0, 0.0, -0.5, 0.0, -2.0, 0.0, 1.6, 0.8];
+    for (index, row) in rows("panda_fk.csv").iter().enumerate() {
+        let mut position = [0.0; JOINTS_MAX];
+        position[0] = (index as f64 * 0.37).fract() - 0.5;
+        position[1..].copy_from_slice(&row[..7]);
+        let goal = chain.forward(&position).base_from_tcp;
+        let solution = chain.inverse(&goal, &seed).unwrap_or_else(|failure| panic!("row {index}: {failure}"));
+        let (shift, turn) = off_by(&chain, &solution, &goal);
+        assert!(shift < 1e-7 && turn < 1e-6, "row {index}: {shift} m, {turn} rad");
+        assert!(chain.is_within_limits(&solution, 0.0), "row {index}: {solution:?}");
+        assert_eq!(chain.inverse(&goal, &seed), Ok(solution), "row {index}");
+    }
+}
+
+/// Velocities of points of the arm agree with differences of their positions.
+#[test]
+fn point_velocities_agree_with_motion() {
+    for (robot, count) in [("ur5", 6), ("panda", 7)] {
+        let chain = chain(robot);
+        for row in rows(&format!("{robot}_fk.csv")).iter().step_by(10) {
+            let position = positions(row, count);
+            let velocity = core::array::from_fn(|k| if k < count { 0.3 - 0.1 * k as f64 } else { 0.0 });
+            let step = 1e-6;
+            let later = core::array::from_fn(|k| position[k] + step * velocity[k]);
+            let (now, then) = (chain.forward(&position), chain.forward(&later));
+            for link in 0..=count {
+                let on_link = nalgebra::Point3::new(0.1, -0.2, 0.05);
+                let [a, b] = [&now, &then].map(|poses| (poses.base_from_link[link] * on_link).coords);
+                let expected = (b - a) / step;
+                let found = chain.point_velocity(&now, link, &a, &velocity);
+                assert!((found - expected).norm() < 1e-5, "{robot} link {link}: {found} against {expected}");
+            }
+        }
+    }
+}

@@ -32,7 +32,7 @@ pub(crate) struct Prefix {
 /// The prefix of a joint starting at `joint.start`; `velocity_min` is its lowest velocity.
 pub(crate) fn prefix(joint: &Joint, velocity_min: f64) -> Prefix {
     let velocity = joint.start[0];
-    let mut prefix = Prefix { steps: [Phase::default(); 2], end: joint.start };
+    let mut prefix = Prefix::none(joint);
     if joint.rise + joint.fall == 0.0 {
         let (limit, braking) = if velocity > joint.peak {
             (joint.peak, -joint.bottom)
@@ -55,7 +55,7 @@ pub(crate) fn prefix(joint: &Joint, velocity_min: f64) -> Prefix {
 
 /// The prefix of a joint whose velocity is not limited.
 pub(crate) fn acceleration_prefix(joint: &Joint) -> Prefix {
-    let mut prefix = Prefix { steps: [Phase::default(); 2], end: joint.start };
+    let mut prefix = Prefix::none(joint);
     if joint.rise + joint.fall > 0.0 {
         prefix.contain(joint);
     }
@@ -63,6 +63,11 @@ pub(crate) fn acceleration_prefix(joint: &Joint) -> Prefix {
 }
 
 impl Prefix {
+    /// No prefix.
+    pub(crate) fn none(joint: &Joint) -> Self {
+        Prefix { steps: [Phase::default(); 2], end: joint.start }
+    }
+
     /// Brings the acceleration into its band.
     fn contain(&mut self, joint: &Joint) {
         let acceleration = self.end[1];

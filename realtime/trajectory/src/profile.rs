@@ -181,6 +181,15 @@ impl Profile {
         scaled
     }
 
+    /// The largest size of the positions that occur in `time`, and at least `least`; not finite if
+    /// some number is not.
+    pub(crate) fn extent(&self, time: f64, least: f64) -> f64 {
+        (0..self.count()).fold(least, |extent, place| {
+            let size = self.positions[place].abs() + time * self.velocities[place].abs();
+            if size <= extent || extent.is_nan() { extent } else { size }
+        })
+    }
+
     /// Ends the motion at `end` in `state`.
     pub(crate) fn finish(&mut self, end: Instant, state: State) {
         self.push(end, state, Slopes { far: 0, near: 0 });

@@ -27,6 +27,16 @@ use crate::{
 /// Relative width within which a gain counts as the gain of the tip: some roundings of the inputs.
 const TIE: f64 = 8.0 * f64::EPSILON;
 
+/// The same where the alternative is to turn the acceleration round first: roundings of a motion
+/// recomputed thousands of times from its own output.
+const LOOSE_TIE: f64 = 2048.0 * TIE;
+
+/// Roundings of velocities up to the limit that a motion recomputed from its own output collects.
+const COLLECTED: f64 = 2048.0 * f64::EPSILON;
+
+/// The share of the last jerk's own work that its collected roundings may amount to.
+pub(crate) const ARRIVAL_SHARE: f64 = 1e-4;
+
 /// A change of velocity: `gain` while the acceleration goes from `start` to `end`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Swing {
@@ -84,14 +94,11 @@ impl Swing {
             let first = if gain >= 0.0 { gain / top } else { -gain / bottom };
             return Durations { first, gap_start: none, gap_end: none };
         }
-        let squares = end * end - start * start;
-        let (tip_time, tip_gain) = if end >= start {
-            (rise * (end - start), rise * squares / 2.0)
-        } else {
-            (fall * (start - end), -fall * squares / 2.0)
-        };
+        let (tip_time, tip_gain) = self.tip();
         let scale = velocity_scale + (rise + fall) * (start * start + end * end) / 2.0;
-        if (gain - tip_gain).abs() <= TIE * scale {
+        let off = (gain - tip_gain).abs();
+        let jumps = if gain < tip_gain { start.min(end) > 0.0 } else { start.max(end) < 0.0 };
+        if off <= TIE * scale || (jumps && off <= LOOSE_TIE * scale) {
             let mut durations = Durations { first: tip_time, gap_start: none, gap_end: none };
             if start.min(end) > 0.0 {
                 (durations.gap_start, durations.gap_end) = self.gap();
@@ -104,6 +111,33 @@ impl Swing {
             self.above()
         } else {
             self.mirrored().above()
+        }
+    }
+
+    /// How long one jerk from the first acceleration to the second takes, if the velocity it gains
+    /// differs from the wanted one by no more than the roundings that a motion recomputed from its own
+    /// output collects; `velocity_max` says how large its velocities have been.
+    pub(crate) fn straight(&self, velocity_scale: f64, velocity_max: f64) -> Option<f64> {
+        let Swing { start, end, gain, rise, fall, .. } = *self;
+        let (time, tip_gain) = self.tip();
+        let scale = velocity_scale + (rise + fall) * (start * start + end * end) / 2.0;
+        let collected = (COLLECTED * velocity_max).min(ARRIVAL_SHARE * tip_gain.abs());
+        ((gain - tip_gain).abs() <= LOOSE_TIE * scale + collected).then_some(time)
+    }
+
+    /// Distance covered by one jerk straight from `start` to `end` in `time`.
+    pub(crate) fn straight_distance(&self, time: f64, velocity: f64) -> f64 {
+        time * (velocity + time * (2.0 * self.start + self.end) / 6.0)
+    }
+
+    /// Duration and gain of one jerk straight from `start` to `end`.
+    fn tip(&self) -> (f64, f64) {
+        let Swing { start, end, rise, fall, .. } = *self;
+        let squares = (end - start) * (end + start);
+        if end >= start {
+            (rise * (end - start), rise * squares / 2.0)
+        } else {
+            (fall * (start - end), -fall * squares / 2.0)
         }
     }
 

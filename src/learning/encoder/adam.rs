@@ -36,7 +36,9 @@ impl Adam {
         let mut flat = Vec::with_capacity(variables.len());
         let mut squares = 0.0_f64;
         for (name, variable) in variables {
-            let Some(gradient) = gradients.get(variable) else { continue };
+            let Some(gradient) = gradients.get(variable) else {
+                continue;
+            };
             let gradient = gradient.flatten_all()?.to_vec1::<f32>()?;
             squares += gradient.iter().map(|g| f64::from(*g) * f64::from(*g)).sum::<f64>();
             flat.push((name, variable, gradient));
@@ -77,8 +79,12 @@ impl Adam {
     pub(crate) fn restore(&mut self, steps: u64, tensors: &BTreeMap<String, Tensor>) -> Result<()> {
         self.steps = steps;
         for (name, first) in tensors {
-            let Some(variable) = name.strip_prefix("adam.0.") else { continue };
-            let Some(second) = tensors.get(&format!("adam.1.{variable}")) else { continue };
+            let Some(variable) = name.strip_prefix("adam.0.") else {
+                continue;
+            };
+            let Some(second) = tensors.get(&format!("adam.1.{variable}")) else {
+                continue;
+            };
             self.moments.insert(variable.to_owned(), [first.to_vec1()?, second.to_vec1()?]);
         }
         Ok(())

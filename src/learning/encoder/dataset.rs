@@ -56,7 +56,9 @@ pub fn example(seed: u64, split: Split, index: u64, sampler: &mut Sampler, cloud
             cloud.push(p);
             materials.push(m);
         });
-        let Some(sample) = sampler.sample(cloud) else { continue };
+        let Some(sample) = sampler.sample(cloud) else {
+            continue;
+        };
         let segment: Vec<bool> =
             sample.source.iter().map(|&i| materials[usize::from(i)] == Material::Feature).collect();
         let shown = segment.iter().filter(|s| **s).count();

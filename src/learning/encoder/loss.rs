@@ -27,7 +27,8 @@ pub(crate) fn loss(output: &Output, examples: &[Example]) -> Result<Tensor> {
 
     let marks: Vec<f32> = examples
         .iter()
-        .flat_map(|e| e.segment.iter().step_by(SEGMENT_STRIDE).map(|s| f32::from(u8::from(*s)))).collect();
+        .flat_map(|e| e.segment.iter().step_by(SEGMENT_STRIDE).map(|s| f32::from(u8::from(*s))))
+        .collect();
     let count = marks.len();
     let marks = Tensor::from_vec(marks, count, &Device::Cpu)?;
     // log(1 + exp(x)) − x·y, written so that neither end overflows.

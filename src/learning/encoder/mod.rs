@@ -16,3 +16,6 @@ mod train;
 pub use dataset::{Example, Split, example};
 pub use specimen::Specimen;
 pub use train::{TrainError, TrainOptions, TrainProgress, train};
+
+#[cfg(test)]
+mod tests;

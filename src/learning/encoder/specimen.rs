@@ -22,8 +22,8 @@ const TILT: [f64; 2] = [0.17, 0.70];
 /// Half the view in extents of the feature.
 const VIEW: [f64; 2] = [1.05, 2.3];
 /// Range noise in half widths of the view, and its limits in metres.
-const NOISE: [f64; 2] = [0.001, 0.008];
-const NOISE_LIMITS: [f64; 2] = [20e-6, 300e-6];
+const NOISE: [f64; 2] = [0.001, 0.010];
+const NOISE_LIMITS: [f64; 2] = [20e-6, 400e-6];
 
 /// A part, what lies around it, and how it is looked at.
 #[derive(Clone, Debug)]

@@ -177,7 +177,7 @@ fn check(options: &TrainOptions) -> Result<(), TrainError> {
 }
 
 /// A network on its way.
-struct Run {
+pub(crate) struct Run {
     network: Network,
     parameters: Parameters,
     adam: Adam,
@@ -187,7 +187,7 @@ struct Run {
 }
 
 impl Run {
-    fn begin(options: &TrainOptions, file: &Path) -> Result<Self, TrainError> {
+    pub(crate) fn begin(options: &TrainOptions, file: &Path) -> Result<Self, TrainError> {
         let mut adam = Adam::new(DECAY);
         if options.resume && file.exists() {
             let tensors: BTreeMap<String, Tensor> =
@@ -216,7 +216,7 @@ impl Run {
         hash.as_bytes()[..4].iter().fold(0, |n, b| n << 8 | u32::from(*b))
     }
 
-    fn epoch(
+    pub(crate) fn epoch(
         &mut self,
         training: &[Example],
         steps: usize,
@@ -248,12 +248,12 @@ impl Run {
     }
 
     /// Weights and statistics, as a model stores them.
-    fn weights(&self) -> Result<BTreeMap<String, Tensor>, TrainError> {
+    pub(crate) fn weights(&self) -> Result<BTreeMap<String, Tensor>, TrainError> {
         let weights = self.parameters.variables.iter().map(|(name, v)| (name.clone(), v.as_tensor().clone()));
         Ok(weights.chain(self.network.statistics()?).collect())
     }
 
-    fn save(&self, file: &Path, options: &TrainOptions) -> Result<(), TrainError> {
+    pub(crate) fn save(&self, file: &Path, options: &TrainOptions) -> Result<(), TrainError> {
         let mut tensors = self.weights()?;
         tensors.extend(self.adam.state()?);
         let run = [Self::fingerprint(options), self.epoch as u32, self.adam.steps as u32];

@@ -133,12 +133,13 @@ fn guess(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<Wall> {
     for _ in 0..if cone { 3 * CIRCLES } else { CIRCLES } {
         let first = rng.random_range(0..=count - slice);
         let [a, b, c] = [0; 3].map(|_| voters[first + rng.random_range(0..slice)]);
-        let Some((centre, radius)) = through(a.xy(), b.xy(), c.xy()) else { continue };
+        let Some((centre, radius)) = through(a.xy(), b.xy(), c.xy()) else {
+            continue;
+        };
         if radius > 1.2 * widest || radius < 0.05 * widest {
             continue;
         }
-        let mut wall =
-            Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2], median: f64::MAX };
+        let mut wall = Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2], median: f64::MAX };
         if cone {
             let height = (a.z + b.z + c.z) / 3.0;
             let other = voters[rng.random_range(0..count)];
@@ -220,7 +221,8 @@ fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall
         wall.median = quantile(&mut off_wall, 0.5);
         reach = (6.0 * wall.median).clamp(0.02 * start, reach);
     }
-    let sane = wall.radius > 0.1 * start && wall.radius < 6.0 * start && wall.lean.norm() < 1.0 && wall.slope.abs() < 2.0;
+    let sane =
+        wall.radius > 0.1 * start && wall.radius < 6.0 * start && wall.lean.norm() < 1.0 && wall.slope.abs() < 2.0;
     sane.then_some(wall)
 }
 

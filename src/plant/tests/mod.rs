@@ -12,6 +12,7 @@ use tandem_msg::{
 use super::parts::Place;
 use super::*;
 
+mod assembly;
 mod handling;
 mod person;
 mod watchdog;
@@ -94,7 +95,7 @@ impl Rig {
         lag
     }
 
-    /// Moves the tool centre point to a pose, in joint space, and stands there.
+    /// Moves the tool centre point to a pose, in joint space, elbow up as at home, and stands there.
     fn tcp_to(&mut self, pose: &Isometry3<f64>) {
         let goal =
             self.cell.robot.chain.inverse(pose, &self.command.position).unwrap_or_else(|e| panic!("{e:?}: {pose}"));
@@ -103,6 +104,15 @@ impl Rig {
         self.move_to(&goal, (1.875 * farthest / 1.6).max(0.5));
         self.cycles(200);
         assert!(self.out.arm.fault.is(PlantFault::None), "the drives follow");
+    }
+
+    /// To a place of the rack from straight above, by way of straight above where it is.
+    fn tcp_to_rack(&mut self, tool: Tool) {
+        let slot = self.cell.layout.rack_slot(tool).expect("four tools").base_from_tcp;
+        let up = Translation3::new(0.0, 0.0, 0.25);
+        self.tcp_to(&(up * self.plant.base_from_tcp));
+        self.tcp_to(&(up * slot));
+        self.tcp_to(&slot);
     }
 
     fn act(&mut self, action: EffectorAction, tool: Tool) -> Option<EffectorPhase> {
@@ -191,16 +201,15 @@ impl Rig {
     }
 
     fn couple(&mut self, tool: Tool) {
-        let slot = |cell: &Cell, tool| cell.layout.rack_slot(tool).expect("four tools").base_from_tcp;
         let present = self.out.arm.effector.tool.get().expect("a tool");
         if present == tool {
             return;
         }
         if present != Tool::None {
-            self.tcp_to(&slot(&self.cell, present));
+            self.tcp_to_rack(present);
             assert_eq!(self.act(EffectorAction::DetachTool, present), Some(EffectorPhase::Done));
         }
-        self.tcp_to(&slot(&self.cell, tool));
+        self.tcp_to_rack(tool);
         assert_eq!(self.act(EffectorAction::AttachTool, tool), Some(EffectorPhase::Done));
         assert!(self.out.arm.effector.tool.is(tool));
     }

@@ -7,6 +7,9 @@ use super::{Near, TOUCHING};
 /// Steps of the root search; every fourth halves the bracket, and in practice ten do.
 const STEPS: u32 = 80;
 
+/// What the search may leave open of a distance, metres.
+const OPEN: f64 = 1e-9;
+
 /// Nearest points of a segment (first) and the cylinder `x² + y² ≤ radius²`, `|z| ≤ half_length` (second), in its frame.
 ///
 /// The squared distance along the segment is convex, so its slope is searched
@@ -39,9 +42,11 @@ pub(crate) fn segment_to_cylinder(segment: &[Vector3<f64>; 2], radius: f64, half
         for step in 0..STEPS {
             let guess = low + (high - low) * (slope_low / (slope_low - slope_high));
             t = if step % 4 == 3 || !(guess > low && guess < high) { 0.5 * (low + high) } else { guess };
-            let at = slope(t);
+            let point = start + along * t;
+            let away = point - nearest(&point);
+            let at = along.dot(&away);
             open = 2.0 * at.abs() * (high - low);
-            if open < 1e-18 {
+            if open <= OPEN * away.norm() {
                 break;
             }
             if at < 0.0 {

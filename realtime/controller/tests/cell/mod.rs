@@ -33,14 +33,14 @@ pub fn ur10() -> Chain {
     let mut joints = Vec::new();
     let mut parent_from_joint: Isometry3<f64> =
         Isometry3::from_parts(Translation3::identity(), UnitQuaternion::from_axis_angle(&Vector3::z_axis(), PI));
-    for i in 0..6 {
+    for (i, velocity_max) in velocity.into_iter().enumerate() {
         joints.push(Joint {
             kind: JointKind::Revolute,
             parent_from_joint,
             axis: Vector3::z_axis(),
             position_min: -2.0 * PI,
             position_max: 2.0 * PI,
-            velocity_max: velocity[i],
+            velocity_max,
             acceleration_max: 8.0,
             jerk_max: 80.0,
             effort_max: 100.0,

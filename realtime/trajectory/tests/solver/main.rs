@@ -2,7 +2,9 @@
 
 mod cases;
 mod check;
+mod closed_loop;
 mod exact;
 mod inputs;
 mod oracle;
+mod raw;
 mod sweep;

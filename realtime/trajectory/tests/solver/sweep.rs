@@ -4,18 +4,20 @@ use crate::{
     check::check,
     inputs::{KINDS, Kind, Problem, Source},
 };
-use tandem_trajectory::{Input, Limits, State, Trajectory};
+use tandem_trajectory::{Input, Limits, State, Synchronization, Trajectory};
 
 /// Problems of each kind; the environment can ask for more.
 fn count() -> usize {
     std::env::var("TANDEM_SWEEP").ok().and_then(|count| count.parse().ok()).unwrap_or(10_000)
 }
 
-fn input<const N: usize>(problems: &[Problem; N]) -> Input<N> {
+fn input<const N: usize>(kind: Kind, problems: &[Problem; N]) -> Input<N> {
     Input {
         start: problems.map(|problem| problem.start),
         target: problems.map(|problem| problem.target),
         limits: problems.map(|problem| problem.limits),
+        // Joints of absurdly different scales share no duration.
+        synchronization: [if kind == Kind::Scales { Synchronization::None } else { Synchronization::Time }; N],
         ..Input::default()
     }
 }
@@ -29,11 +31,11 @@ fn every_random_problem_is_solved_validly() {
         let mut source = Source::new(kind, 1);
         for index in 0..count() / 3 {
             let problems = [source.problem(), source.problem(), source.problem()];
-            let trajectory = Trajectory::calculate(&input(&problems));
+            let trajectory = Trajectory::calculate(&input(kind, &problems));
             let trajectory = trajectory.unwrap_or_else(|error| panic!("{kind:?} {index}: {error} {problems:?}"));
-            let duration = trajectory.duration();
             for (profile, problem) in trajectory.profiles().iter().zip(&problems) {
                 let Problem { start, target, limits } = problem;
+                let duration = profile.duration();
                 let faults = check(profile, start, target, true, limits);
                 let finite = |limit: f64| if limit.is_finite() { limit } else { 0.0 };
                 // Switching times are known to 2^-77 of the duration; the jerk makes an acceleration of
@@ -58,8 +60,8 @@ fn every_random_problem_is_solved_validly() {
                 }
                 let excess = 1e-11 + (2.0 * blur + 1e-15 * push) * duration;
                 assert!(
-                    relative[0] < 1e-14
-                        && relative[1] < 1e-14
+                    relative[0] < if kind == Kind::Noise { 1e-10 } else { 1e-14 }
+                        && relative[1] < if kind == Kind::Noise { 1e-11 } else { 1e-14 }
                         && relative[2] < 1e-13
                         && relative[3] < excess
                         && relative[4] < 1e-13,
@@ -81,7 +83,9 @@ fn every_random_problem_is_solved_validly() {
 }
 
 fn duration(problem: &Problem) -> f64 {
-    Trajectory::calculate(&input(&[*problem])).unwrap_or_else(|error| panic!("{error} {problem:?}")).duration()
+    Trajectory::calculate(&input(Kind::Benchmark, &[*problem]))
+        .unwrap_or_else(|error| panic!("{error} {problem:?}"))
+        .duration()
 }
 
 fn map_state(state: State, by: [f64; 3]) -> State {

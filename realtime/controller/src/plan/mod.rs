@@ -17,7 +17,9 @@
 //! nearer than it is; the objects of the task and of the one before may be
 //! touched until that stretch is done.
 
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+mod route;
+
+use nalgebra::{Isometry3, Translation3};
 use tandem_clearance::Monitor;
 use tandem_kinematics::{Branches, Chain};
 use tandem_msg::{AttachedPart, MotionFailure, MotionPhase};
@@ -28,6 +30,7 @@ use crate::path::Path;
 use crate::reach::Reach;
 use crate::sweep::{Sweep, Swept};
 use crate::{Joints, Params};
+use route::{ROUTES, via_points};
 use tandem_trajectory::State;
 
 /// Objects that may be touched: those of a task and of the task before it. 0 = none.
@@ -37,8 +40,6 @@ pub(crate) type Touch = [u32; 16];
 const LEGS_MAX: usize = 5;
 /// Ways to depart.
 const DEPARTS: usize = 3;
-/// Routes across.
-const ROUTES: usize = 6;
 /// A start that is this far off the approach line, or less, is on it: metres, rad.
 const ON_LINE: f64 = 0.008;
 const ON_LINE_TURN: f64 = 0.03;
@@ -244,7 +245,7 @@ impl Search {
                 Swept::Clear => Step::Found,
                 Swept::Blocked => self.after_straight(tools),
             },
-            Step::Branch => self.next_branch(tools),
+            Step::Branch => self.next_branch(),
             Step::ApproachLine => match self.line.step(tools.chain) {
                 Ok(None) => step,
                 Ok(Some(path)) => {
@@ -357,7 +358,7 @@ impl Search {
         }
     }
 
-    fn next_branch(&mut self, tools: &mut Tools<'_>) -> Step {
+    fn next_branch(&mut self) -> Step {
         if self.branch >= self.branch_count {
             let failure = if self.reached { MotionFailure::NoClearPath } else { MotionFailure::Unreachable };
             return Step::Failed(failure);
@@ -373,7 +374,6 @@ impl Search {
         let end = &self.goal.base_from_tcp;
         let from = end * Translation3::new(0.0, 0.0, -self.goal.approach);
         self.line = Line::backward(&from, end, &goal);
-        let _ = tools;
         Step::ApproachLine
     }
 
@@ -467,54 +467,4 @@ fn copy_branches(found: &Branches, into: &mut [Joints; 8]) -> usize {
         count += 1;
     }
     count
-}
-
-/// Via points of a route; `None` when the route does not apply.
-fn via_points(route: usize, from: &Joints, to: &Joints, tools: &Tools<'_>, vias: &mut [Joints; 2]) -> Option<usize> {
-    let chain = tools.chain;
-    let start = chain.forward(from).base_from_tcp;
-    let end = chain.forward(to).base_from_tcp;
-    let top = start.translation.z.max(end.translation.z) + tools.params.via_rise;
-    let raised = |pose: &Isometry3<f64>| {
-        let mut raised = *pose;
-        raised.translation.z = top;
-        raised
-    };
-    let middle = |aside: f64| {
-        let across = end.translation.vector - start.translation.vector;
-        let level = Vector3::new(-across.y, across.x, 0.0);
-        let side = level.try_normalize(1e-3).unwrap_or_else(Vector3::y);
-        let mut position = start.translation.vector.lerp(&end.translation.vector, 0.5) + side * aside;
-        position.z = top;
-        let rotation: UnitQuaternion<f64> = start.rotation.try_slerp(&end.rotation, 0.5, 1e-6).unwrap_or(end.rotation);
-        Isometry3::from_parts(Translation3::from(position), rotation)
-    };
-    let mut halfway = *from;
-    for (half, to) in halfway.iter_mut().zip(to) {
-        *half = 0.5 * (*half + to);
-    }
-    match route {
-        0 => Some(0),
-        1 => {
-            vias[0] = chain.inverse(&raised(&start), from).ok()?;
-            vias[1] = chain.inverse(&raised(&end), to).ok()?;
-            Some(2)
-        }
-        2 => {
-            vias[0] = chain.inverse(&middle(0.0), &halfway).ok()?;
-            Some(1)
-        }
-        3 => {
-            vias[0] = chain.inverse(&middle(tools.params.via_offset), &halfway).ok()?;
-            Some(1)
-        }
-        4 => {
-            vias[0] = chain.inverse(&middle(-tools.params.via_offset), &halfway).ok()?;
-            Some(1)
-        }
-        _ => {
-            vias[0] = tools.params.home;
-            Some(1)
-        }
-    }
 }

@@ -1,0 +1,135 @@
+//! No query allocates, and none panics, whatever the numbers.
+#![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
+
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use proptest::prelude::*;
+use tandem_clearance::{ArmBody, LinkCapsule, Monitor};
+use tandem_cycle::guard::{CountingAllocator, counted};
+use tandem_kinematics::{Chain, Joint, JointKind, manipulability};
+use tandem_msg::{AttachedPart, Capsule, Code, Pose, SceneObject};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+/// An arm of `count` joints whose axes turn by a quarter from one to the next; every third slides.
+fn chain(count: usize) -> Chain {
+    let joint = |index: usize| Joint {
+        kind: if index % 3 == 2 { JointKind::Prismatic } else { JointKind::Revolute },
+        parent_from_joint: Isometry3::from_parts(
+            Vector3::new(0.1, 0.0, 0.2).into(),
+            UnitQuaternion::from_euler_angles(1.5, 0.1 * index as f64, 0.0),
+        ),
+        axis: Vector3::z_axis(),
+        position_min: -3.0,
+        position_max: 3.0,
+        velocity_max: 1.0,
+        acceleration_max: 1.0,
+        jerk_max: 1.0,
+        effort_max: 1.0,
+    };
+    let joints: Vec<Joint> = (0..count).map(joint).collect();
+    Chain::new(&joints, Isometry3::translation(0.0, 0.0, 0.1)).expect("up to eight joints are a chain")
+}
+
+fn body(count: usize) -> ArmBody {
+    let capsules: Vec<LinkCapsule> = (0..=count)
+        .map(|link| LinkCapsule { link, ends: [[0.0; 3], [0.1, 0.0, 0.2]], radius: 0.03, tool: link == count })
+        .collect();
+    let pairs: Vec<[usize; 2]> = (0..=count).flat_map(|a| (a + 2..=count).map(move |b| [a, b])).collect();
+    ArmBody::new(&capsules, &pairs).expect("nine capsules are an arm")
+}
+
+/// Numbers as a faulty peer may send them, mostly of the size of a cell.
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        30 => -2.0..2.0_f64,
+        1 => Just(0.0),
+        1 => Just(f64::NAN),
+        1 => Just(f64::INFINITY),
+        1 => Just(-1e300),
+        1 => Just(5e-324),
+    ]
+}
+
+fn three() -> impl Strategy<Value = [f64; 3]> {
+    [number(), number(), number()]
+}
+
+fn pose() -> impl Strategy<Value = Pose> {
+    (three(), [number(), number(), number(), number()], any::<bool>()).prop_map(|(position, q, sound)| {
+        let norm = q.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let rotation = if sound { q.map(|x| x / norm) } else { q };
+        Pose { position, rotation }
+    })
+}
+
+fn objects() -> impl Strategy<Value = Vec<SceneObject>> {
+    let object = (0..5_u32, three(), pose()).prop_map(|(shape, size, base_from_object)| SceneObject {
+        id: 0,
+        shape: Code::from_raw(shape),
+        size: size.map(f64::abs),
+        base_from_object,
+    });
+    prop::collection::vec(object, 0..12).prop_map(|mut objects| {
+        for (index, object) in objects.iter_mut().enumerate() {
+            object.id = index as u32 + 1;
+        }
+        objects
+    })
+}
+
+fn people() -> impl Strategy<Value = Vec<Capsule>> {
+    let capsule = (three(), three(), number(), three()).prop_map(|(a, b, radius, velocity)| Capsule {
+        ends: [a, b],
+        radius: radius.abs(),
+        velocity,
+    });
+    prop::collection::vec(capsule, 0..6)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Kinematics and clearance together, as a cycle calls them: nothing is asked of the allocator, and no
+    /// distance is a NaN.
+    #[test]
+    fn nothing_allocates_or_panics(
+        count in 1..=8_usize,
+        position in prop::array::uniform8(number()),
+        other in prop::array::uniform8(number()),
+        objects in objects(),
+        people in people(),
+        half_extents in three(),
+        place in pose(),
+        margin in number(),
+    ) {
+        let (chain, body) = (chain(count), body(count));
+        let part = AttachedPart { present: 1, half_extents, tcp_from_part: place, ..AttachedPart::default() };
+        let (distances, calls) = counted(|| {
+            let mut monitor = Monitor::new(body);
+            let _ = monitor.set_scene(&objects);
+            monitor.set_human(&people);
+            monitor.set_attached(Some(&part));
+            monitor.set_touch(&[1, 2, 0]);
+            let (poses, jacobian) = chain.jacobian(&position);
+            let lost = manipulability(&jacobian);
+            let solved = chain.inverse(&poses.base_from_tcp, &other).is_ok();
+            let clear = monitor.is_clear(&poses, margin);
+            let path = monitor.path_is_clear(&chain, &position, &other, margin, 0.01);
+            let clearance = monitor.clearance(&poses);
+            let separation = monitor.separation(&poses);
+            let each = monitor.separations(&poses);
+            core::hint::black_box((lost, solved, clear, path));
+            (clearance.distance, separation.distance, each[0].distance, clear)
+        });
+        prop_assert!(calls.is_none(), "{calls:?}");
+        prop_assert!(!distances.0.is_nan() && !distances.1.is_nan() && !distances.2.is_nan(), "{distances:?}");
+        if margin.is_finite() {
+            prop_assert_eq!(distances.3, distances.0 > margin);
+        }
+        if position[..count].iter().any(|q| !q.is_finite()) {
+            prop_assert_eq!(distances.0, f64::NEG_INFINITY);
+            prop_assert_eq!(distances.1, f64::NEG_INFINITY);
+        }
+    }
+}

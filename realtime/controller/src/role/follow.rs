@@ -1,0 +1,164 @@
+//! The next set-point: made, checked, and only then sent.
+
+use tandem_msg::{JOINTS_MAX, Stamp, StopCategory, StopCause, StopState};
+use tandem_trajectory::State;
+
+use super::Controller;
+use crate::governor::{Governor, Person};
+use crate::inputs::Heard;
+use crate::law::{Law, Refused, Stop};
+use crate::stop::{Causes, Seen};
+
+impl Controller {
+    /// Makes the next set-point, checks it, and sends it or the stop that was checked before it.
+    pub(super) fn follow(&mut self, now: Stamp, go: bool, heard: &Heard, reset_count: u32, mut causes: Causes) {
+        self.motion.slow(self.period);
+        let mut next = None;
+        let mut choice = 0;
+        if let Some(law) = self.motion.law() {
+            match self.next_law(&law, go) {
+                Ok(law) => {
+                    let level = self.check(now, &law, &mut causes);
+                    choice = if go { level } else { 0 };
+                    next = Some(law);
+                }
+                Err(Refused) => self.refused = true,
+            }
+        } else {
+            self.guard.measure(&self.chain, &self.motion.set().position);
+            let person = self.person(now);
+            self.required =
+                if person.distance == f64::INFINITY { 0.0 } else { self.governor.required_at_rest(&person) };
+            self.governor.watch_at_rest(now, &person);
+        }
+        if self.refused {
+            causes.add(StopCause::Internal);
+        }
+        if self.stop.cause() == StopCause::Separation && !self.governor.enough() {
+            // The cause lasts until there is room to start again, not only until the arm stands.
+            causes.add(StopCause::Separation);
+        }
+        let before = self.stop.state();
+        let cause = self.stop.cause();
+        let state = self.stop.update(
+            now,
+            &Seen {
+                causes,
+                standstill: self.motion.standstill(),
+                reset_count: heard.task.good.then_some(reset_count),
+                supervisor_restarted: heard.task.restarted,
+            },
+        );
+        if before == StopState::Stopped && state == StopState::Running && cause != StopCause::Separation {
+            // What was planned may be why it stopped.
+            if self.motion.law().is_some() {
+                self.motion.rest();
+                next = None;
+            }
+            self.plan_anew();
+        }
+        if state != StopState::Running {
+            choice = 0;
+            if self.stop.category() == StopCategory::Zero {
+                self.leave(now);
+                next = None;
+            } else if let Some(law) = self.motion.law() {
+                next = self.stopped(&law);
+            }
+        } else if choice == 0
+            && next.is_some_and(|law| !law.stopping())
+            && let Some(law) = self.motion.law()
+        {
+            next = self.stopped(&law);
+        }
+        self.law_level = choice;
+        if let Some(law) = next {
+            let set = self.motion.set_point(&law.state());
+            self.motion.commit(law, &set);
+        }
+    }
+
+    /// The law one period on, for the level chosen in the cycle before.
+    fn next_law(&self, law: &Law, go: bool) -> Result<Law, Refused> {
+        let level = if go { self.law_level } else { 0 };
+        let next = law.at_level(level, Governor::share(level), self.motion.path().length(), self.motion.limits())?;
+        Ok(next.advanced(self.period))
+    }
+
+    /// A stop from where the law is now, one period on.
+    fn stopped(&mut self, law: &Law) -> Option<Law> {
+        match law.at_level(0, 0.0, self.motion.path().length(), self.motion.limits()) {
+            Ok(stop) => Some(stop.advanced(self.period)),
+            Err(Refused) => {
+                self.refused = true;
+                None
+            }
+        }
+    }
+
+    /// Checks a set-point on the path before it goes out; returns the level for the cycle after.
+    fn check(&mut self, now: Stamp, law: &Law, causes: &mut Causes) -> usize {
+        let state = law.state();
+        let Ok(stop) = Law::stop_from(state, self.motion.limits()) else {
+            self.refused = true;
+            return 0;
+        };
+        let moving = state.velocity > 0.0;
+        let set = self.motion.set_point(&state);
+        self.refused |= !self.is_sound(&set.position, &set.velocity);
+
+        self.guard.measure(&self.chain, &set.position);
+        if moving && !(self.guard.clearance().distance >= self.guard.floor()) {
+            causes.add(StopCause::Clearance);
+        }
+        self.guard.sweep(&self.chain, self.motion.path(), state.position, stop.end);
+        let known = self.guard.clear_to() + 1e-9 >= stop.end;
+        if moving && !known && self.guard.blocked() {
+            causes.add(StopCause::Clearance);
+        }
+
+        let person = self.person(now);
+        let level = self.separate(now, &state, &stop, &person, moving, causes);
+        if known && !self.guard.blocked() { level } else { 0 }
+    }
+
+    /// The separation part of the check.
+    fn separate(
+        &mut self,
+        now: Stamp,
+        state: &State,
+        stop: &Stop,
+        person: &Person,
+        moving: bool,
+        causes: &mut Causes,
+    ) -> usize {
+        let mut gradient = 0.0;
+        self.required = 0.0;
+        if person.distance != f64::INFINITY {
+            let ahead = self.governor.look_ahead(state, stop).min(self.motion.path().length());
+            let way = ahead - state.position;
+            if way > 1e-9 {
+                let there = self.guard.distance_at(&self.chain, &self.motion.path().at(ahead).position);
+                gradient = ((person.distance - there) / way).max(0.0);
+            }
+            let braking = (stop.end - state.position).max(0.0);
+            self.required = self.governor.required(person, state.velocity, braking, stop.duration, gradient);
+            if moving && !(person.distance >= self.required) {
+                causes.add(StopCause::Separation);
+            }
+        }
+        self.governor.choose(now, person, gradient, state.velocity, self.required)
+    }
+
+    fn person(&self, now: Stamp) -> Person {
+        Person::new(self.guard.separation(), self.watch.human_age(now), self.human_sigma, &self.params.separation)
+    }
+
+    /// The last line of defence against a fault in here: finite, no faster than the joints may go.
+    fn is_sound(&self, position: &[f64; JOINTS_MAX], velocity: &[f64; JOINTS_MAX]) -> bool {
+        /// Rounding.
+        const SLACK: f64 = 1.01;
+        position.iter().all(|position| position.is_finite())
+            && velocity.iter().zip(&self.velocity_max).all(|(velocity, limit)| velocity.abs() <= limit * SLACK)
+    }
+}

@@ -1,0 +1,309 @@
+//! One control cycle, from what was heard to what is commanded.
+
+mod follow;
+mod task;
+
+use nalgebra::Vector3;
+use tandem_clearance::{ArmBody, Monitor};
+use tandem_kinematics::Chain;
+use tandem_msg::{
+    Code, HumanState, JOINTS_MAX, JointCommand, JointState, MotionPhase, MotionStatus, MotionTask, Planner, PlantFault,
+    RunMode, Scene, Stamp, StopCategory, StopCause, StopState,
+};
+
+use crate::effector::Effector;
+use crate::governor::Governor;
+use crate::guard::Guard;
+use crate::inputs::{Heard, Watch, arm_follows, run_mode};
+use crate::job::{Job, Stage, pose};
+use crate::motion::Motion;
+use crate::plan::Search;
+use crate::reach::Reach;
+use crate::stop::{Causes, StopMonitor};
+use crate::{Params, ParamsError};
+
+/// What the controller reads each cycle: the latest value of each service, heard or not.
+#[derive(Clone, Copy)]
+pub struct ControllerInputs<'a> {
+    /// Measured arm.
+    pub arm: &'a JointState,
+    /// Tracked person.
+    pub human: &'a HumanState,
+    /// Obstacles.
+    pub scene: &'a Scene,
+    /// Work.
+    pub task: &'a MotionTask,
+}
+
+/// What the controller writes each cycle; headers are the shell's.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ControllerOutputs {
+    /// To the arm.
+    pub command: JointCommand,
+    /// To everyone.
+    pub status: MotionStatus,
+}
+
+/// The controller role. A value of some tens of kilobytes that never grows.
+pub struct Controller {
+    chain: Chain,
+    params: Params,
+    reach: Reach,
+    velocity_max: [f64; JOINTS_MAX],
+    period: f64,
+
+    watch: Watch,
+    arm: JointState,
+    human_sigma: f64,
+    scene_key: Option<(u64, u64)>,
+    scene_valid: bool,
+    plan_is_current: bool,
+
+    stop: StopMonitor,
+    job: Job,
+    effector: Effector,
+    search: Search,
+    planner: Monitor,
+    motion: Motion,
+    guard: Guard,
+    governor: Governor,
+    /// Level the law in force was made for.
+    law_level: usize,
+    /// An internal check failed in this cycle.
+    refused: bool,
+    started: bool,
+    required: f64,
+    tcp_speed: f64,
+    base_from_tcp: tandem_msg::Pose,
+}
+
+impl Controller {
+    /// A controller of an arm, at rest and with nothing heard.
+    ///
+    /// # Errors
+    /// Every parameter that is out of range.
+    pub fn new(chain: Chain, body: ArmBody, params: Params) -> Result<Self, ParamsError> {
+        params.check()?;
+        let mut velocity_max = [0.0; JOINTS_MAX];
+        for (limit, joint) in velocity_max.iter_mut().zip(chain.joints()) {
+            *limit = joint.velocity_max;
+        }
+        Ok(Self {
+            reach: Reach::new(&chain, &body),
+            velocity_max,
+            period: params.period.as_secs_f64(),
+            watch: Watch::default(),
+            arm: JointState::default(),
+            human_sigma: 0.0,
+            scene_key: None,
+            scene_valid: false,
+            plan_is_current: false,
+            stop: StopMonitor::new(params.resume_after_separation, params.separation.resume_delay),
+            job: Job::none(),
+            effector: Effector::default(),
+            search: Search::new(),
+            planner: Monitor::new(body),
+            motion: Motion::new(&chain),
+            guard: Guard::new(&chain, body, params.clearance_min),
+            governor: Governor::new(&params.separation),
+            law_level: 0,
+            refused: false,
+            started: false,
+            required: 0.0,
+            tcp_speed: 0.0,
+            base_from_tcp: tandem_msg::Pose::IDENTITY,
+            chain,
+            params,
+        })
+    }
+
+    /// Runs one cycle: reads the latest inputs, writes the next command and the status.
+    ///
+    /// # Realtime
+    /// Bounded; no allocation, lock, system call or panic.
+    pub fn cycle(&mut self, now: Stamp, inputs: &ControllerInputs<'_>, outputs: &mut ControllerOutputs) {
+        self.refused = false;
+        if !self.started {
+            // What the arm did for a controller before this one is no answer to this one.
+            self.started = true;
+            self.motion.slack_anew(now);
+        }
+        let heard = self.watch.judge(now, inputs, &self.params, &self.velocity_max[..self.chain.joint_count()]);
+        let mut causes = heard.causes;
+        self.absorb(inputs, &heard, &mut causes);
+        let brake = self.brakes(heard.arm.good);
+        self.engage(now, &heard, brake, &mut causes);
+        self.take_task(now, inputs.task, &heard);
+        let run = if heard.task.good { run_mode(inputs.task) } else { RunMode::Halt };
+        let replaced = heard.task.good && !self.job.is_of(inputs.task);
+        let go = self.stop.running() && run == RunMode::Run && !replaced && self.job.abandon.is_none();
+        self.advance_task(now, go, heard.arm.good);
+        self.follow(now, go, &heard, inputs.task.reset_count, causes);
+        self.job.clearance_min = self.job.clearance_min.min(self.guard.clearance().distance);
+        self.command(now, heard.arm.good, &mut outputs.command);
+        self.status(now, &mut outputs.status);
+    }
+
+    /// Keeps what may be used of this cycle's samples.
+    fn absorb(&mut self, inputs: &ControllerInputs<'_>, heard: &Heard, causes: &mut Causes) {
+        if heard.arm.new {
+            self.arm = *inputs.arm;
+            for beyond in self.chain.joint_count()..JOINTS_MAX {
+                self.arm.position[beyond] = 0.0;
+                self.arm.velocity[beyond] = 0.0;
+            }
+            let (poses, jacobian) = self.chain.jacobian(&self.arm.position);
+            let velocity = nalgebra::SVector::<f64, JOINTS_MAX>::from(self.arm.velocity);
+            let twist = jacobian * velocity;
+            self.tcp_speed = Vector3::new(twist[0], twist[1], twist[2]).norm();
+            self.base_from_tcp = pose(&poses.base_from_tcp);
+        }
+        if heard.human.new {
+            self.guard.set_human(inputs.human);
+            self.human_sigma = inputs.human.position_sigma;
+        }
+        if heard.scene.good {
+            let key = (inputs.scene.header.epoch, inputs.scene.version);
+            if self.scene_key != Some(key) {
+                self.scene_key = Some(key);
+                self.plan_is_current = false;
+                let guarded = self.guard.set_scene(inputs.scene);
+                self.scene_valid = guarded && self.planner.set_scene(inputs.scene.objects()).is_ok();
+                if let Stage::Planning { begun } = &mut self.job.stage {
+                    *begun = false;
+                }
+            }
+            if !self.scene_valid {
+                causes.add(StopCause::SceneInvalid);
+            }
+        }
+    }
+
+    /// Whether this controller asks for closed brakes.
+    fn brakes(&self, arm_good: bool) -> bool {
+        let stopped = match (self.stop.state(), self.stop.category()) {
+            (StopState::Running, _) | (_, StopCategory::Two) => false,
+            (_, StopCategory::Zero) => true,
+            (state, StopCategory::One) => state == StopState::Stopped,
+        };
+        (stopped && self.stop.armed()) || (self.motion.slack_since().is_some() && !arm_good)
+    }
+
+    /// Follows the arm in and out of its brakes, and judges how it follows.
+    fn engage(&mut self, now: Stamp, heard: &Heard, brake: bool, causes: &mut Causes) {
+        if brake {
+            self.leave(now);
+            self.motion.slack_anew(now);
+        }
+        if heard.arm.restarted {
+            // Another incarnation of the arm: where it is has nothing to do with where it was sent.
+            causes.add(StopCause::PlantBraked);
+            self.leave(now);
+        }
+        let Some(since) = self.motion.slack_since() else {
+            if heard.arm.good {
+                self.judge_arm(now, causes);
+            }
+            return;
+        };
+        if !heard.arm.good {
+            return;
+        }
+        self.motion.mirror(&self.arm);
+        self.effector.adopt(&self.arm.effector);
+        if brake {
+            return;
+        }
+        if arm_follows(&self.arm, since) {
+            self.refused |= self.motion.engage(&self.arm).is_err();
+        } else if since.age_at(now) > self.params.engage_timeout {
+            causes.add(StopCause::PlantBraked);
+        }
+    }
+
+    /// Tracking error, joint limits and brakes of an arm that is asked to follow.
+    fn judge_arm(&mut self, now: Stamp, causes: &mut Causes) {
+        let set = *self.motion.set();
+        for (index, joint) in self.chain.joints().iter().enumerate() {
+            let measured = self.arm.position[index];
+            if !((measured - set.position[index]).abs() <= self.params.tracking_error_max) {
+                causes.add(StopCause::TrackingError);
+            }
+            let tolerance = self.params.joint_limit_tolerance;
+            let above = measured > joint.position_max + tolerance && set.velocity[index] > 0.0;
+            let below = measured < joint.position_min - tolerance && set.velocity[index] < 0.0;
+            if above || below {
+                causes.add(StopCause::JointLimit);
+            }
+        }
+        if !self.arm.fault.is(PlantFault::None) {
+            causes.add(StopCause::PlantBraked);
+            self.leave(now);
+        }
+    }
+
+    /// Gives up the path and goes slack; the task will be planned anew from where the arm is then.
+    fn leave(&mut self, now: Stamp) {
+        self.motion.slacken(now);
+        self.plan_anew();
+    }
+
+    fn plan_anew(&mut self) {
+        if matches!(self.job.stage, Stage::Leg(_) | Stage::Planning { .. }) {
+            self.job.stage = Stage::Planning { begun: false };
+        }
+    }
+
+    fn command(&self, now: Stamp, arm_good: bool, command: &mut JointCommand) {
+        let set = self.motion.set();
+        let header = command.header;
+        *command = JointCommand {
+            header,
+            valid_until: now.after(self.params.command_validity),
+            joint_count: self.chain.joint_count() as u32,
+            brake: u32::from(self.brakes(arm_good)),
+            position: set.position,
+            velocity: set.velocity,
+            acceleration: set.acceleration,
+            effector: self.effector.command(),
+        };
+    }
+
+    fn status(&self, now: Stamp, status: &mut MotionStatus) {
+        let leg = match self.job.stage {
+            Stage::Leg(index) => self.search.legs().get(index).map_or(MotionPhase::Idle, |leg| leg.phase),
+            _ => MotionPhase::Idle,
+        };
+        let (clearance, separation) = (self.guard.clearance(), self.guard.separation());
+        let nearest = if separation.distance < clearance.distance {
+            [separation.link as u32, 1000 + separation.capsule as u32]
+        } else {
+            [clearance.link as u32, clearance.object]
+        };
+        let planned = !matches!(self.job.stage, Stage::Idle | Stage::Planning { .. });
+        *status = MotionStatus {
+            header: status.header,
+            task_id: self.job.task.id,
+            phase: Code::of(self.job.phase(leg)),
+            failure: Code::of(self.job.failure()),
+            planner: Code::of(if planned { Planner::Manual } else { Planner::None }),
+            stop: Code::of(self.stop.state()),
+            cause: Code::of(self.stop.cause()),
+            category: Code::of(self.stop.category()),
+            standstill: u32::from(self.motion.standstill()),
+            stop_count: self.stop.count(),
+            reset_seen: self.stop.reset_seen(),
+            nearest,
+            clearance: clearance.distance,
+            clearance_min: self.job.clearance_min,
+            separation: separation.distance,
+            separation_required: self.required,
+            speed: Governor::share(self.law_level) * self.job.task.speed,
+            tcp_speed: self.tcp_speed,
+            elapsed: self.job.elapsed(now),
+            expected: self.job.expected,
+            scene_version: self.scene_key.map_or(0, |(_, version)| version),
+            base_from_tcp: self.base_from_tcp,
+        };
+    }
+}

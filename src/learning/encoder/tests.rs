@@ -1,0 +1,382 @@
+//! The trainer trains, repeats, resumes; the shipped model is as good as its card says.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use candle_core::{Device, Tensor};
+use nalgebra::{Isometry3, Vector3};
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
+use tandem_config::{Body, FeatureGeometry};
+use tandem_msg::{Coded, Feature, FeatureClass, Header, PointCloud, Pose, Recognition, Stamp};
+
+use super::dataset::{Example, Split, example};
+use super::loss::loss;
+use super::parameters::Parameters;
+use super::train::{Run, SEGMENT_STRIDE, TrainOptions, train};
+use crate::perception::network::{Input, Network};
+use crate::perception::{CARD_FILE, Model, ModelError, Perception, Sampler, WEIGHTS_FILE};
+use crate::plant::camera::{Camera, TILT, View, feature_from_camera, half_width};
+use crate::plant::solid::{Solid, Surroundings};
+
+fn shipped() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("config/models/s471")
+}
+
+fn examples(seed: u64, split: Split, count: u64) -> Vec<Example> {
+    let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
+    (0..count).map(|index| example(seed, split, index, &mut sampler, &mut cloud)).collect()
+}
+
+/// No operation on the way cuts the gradient: every variable gets one that is not all zero.
+#[test]
+fn gradients_reach_every_variable() {
+    let mut parameters = Parameters::fresh(1);
+    let network = Network::new(&mut parameters).expect("fresh numbers have the right shapes");
+    let examples = examples(1, Split::Train, 8);
+    let samples: Vec<_> = examples.iter().map(|e| &e.sample).collect();
+    let input = Input::of(&samples, SEGMENT_STRIDE, &Device::Cpu).expect("samples are well formed");
+    let mask = Tensor::ones((8, network.dropout_width()), candle_core::DType::F32, &Device::Cpu).expect("small");
+    let output = network.forward(&input, Some(&mask)).expect("shapes agree");
+    let gradients = loss(&output, &examples).and_then(|l| l.backward()).expect("all operations have gradients");
+    assert!(parameters.variables.len() > 40, "{} variables", parameters.variables.len());
+    for (name, variable) in &parameters.variables {
+        let gradient = gradients.get(variable).unwrap_or_else(|| panic!("{name}: no gradient"));
+        let largest = gradient.abs().and_then(|g| g.flatten_all()?.max(0)?.to_scalar::<f32>()).expect("numbers");
+        assert!(largest > 0.0 && largest.is_finite(), "{name}: gradient {largest}");
+    }
+}
+
+/// An example follows from seed, split and number alone, and shows its feature.
+#[test]
+fn examples_repeat_and_show_their_feature() {
+    let (first, again) = (examples(9, Split::Test, 16), examples(9, Split::Test, 16));
+    let other = examples(9, Split::Validation, 16);
+    for ((a, b), c) in first.iter().zip(&again).zip(&other) {
+        assert_eq!(a.sample, b.sample);
+        assert_ne!(a.sample, c.sample, "splits are disjoint");
+        let shown = a.segment.iter().filter(|s| **s).count();
+        assert!(a.class == FeatureClass::Other || shown >= 24, "{}: {shown} points", a.class);
+    }
+}
+
+fn options(out: &Path, epochs: usize) -> TrainOptions {
+    TrainOptions { samples: 64, epochs, seed: 3, out: out.to_owned(), resume: false }
+}
+
+/// A small run learns what it is shown, and its model loads.
+#[test]
+fn a_small_run_beats_chance() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let mut losses = BTreeMap::new();
+    let card = train(&options(folder.path(), 14), &mut |p| {
+        if let super::TrainProgress::Step(epoch, _, _, loss) = p {
+            losses.insert(*epoch, *loss);
+        }
+    })
+    .expect("it trains");
+    let (first, last) = (losses[&1], losses[&14]);
+    println!("loss {first:.2} -> {last:.2}, accuracy on 64 others {:.2} (chance 0.125)", card.metrics.accuracy);
+    assert!(last < 0.8 * first, "loss {first} -> {last}");
+    assert!(card.metrics.accuracy > 0.2, "{}", card.metrics.accuracy);
+    assert!(Perception::load(folder.path()).is_ok());
+}
+
+/// A run that went on from its checkpoint equals one that never stopped.
+#[test]
+fn a_resumed_run_is_the_same_run() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let file = folder.path().join("checkpoint");
+    let options = TrainOptions { resume: true, ..options(folder.path(), 2) };
+    let training = examples(3, Split::Train, 64);
+    let numbers = |run: &Run| -> Vec<(String, Vec<f32>)> {
+        let weights = run.weights().expect("plain tensors");
+        weights.into_iter().map(|(n, t)| (n, t.flatten_all().and_then(|t| t.to_vec1()).expect("f32"))).collect()
+    };
+    let mut whole = Run::begin(&options, &file).expect("fresh");
+    whole.epoch(&training, 4, &options, &mut |_| {}).expect("trains");
+    whole.save(&file, &options).expect("saves");
+    whole.epoch(&training, 4, &options, &mut |_| {}).expect("trains");
+    let mut resumed = Run::begin(&options, &file).expect("resumes");
+    resumed.epoch(&training, 4, &options, &mut |_| {}).expect("trains");
+    assert!(numbers(&whole) == numbers(&resumed));
+
+    let other = TrainOptions { seed: 4, ..options };
+    assert!(Run::begin(&other, &file).is_err(), "a checkpoint of another seed is refused");
+}
+
+/// The shipped model recognises fresh parts nearly as well as its card says.
+#[test]
+fn the_shipped_model_keeps_its_promise() {
+    let mut perception = Perception::load(&shipped()).expect("the shipped model is sound");
+    let promised = perception.card().metrics.accuracy;
+    let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
+    let (mut right, mut sure, mut sure_wrong, count) = (0, 0, 0, 240);
+    for index in 0..count {
+        // A seed no training uses.
+        let truth = example(0xf5e5, Split::Test, index, &mut sampler, &mut cloud);
+        let Some(answer) = perception.recognise(&cloud) else {
+            continue;
+        };
+        let hit = answer.class == truth.class;
+        right += u32::from(hit);
+        if f64::from(answer.probabilities[answer.class.code() as usize]) >= perception.card().threshold {
+            sure += 1;
+            sure_wrong += u32::from(!hit);
+        }
+    }
+    let accuracy = f64::from(right) / count as f64;
+    println!("accuracy {accuracy:.3} (card {promised:.3}), sure {sure} of {count}, wrong when sure {sure_wrong}");
+    assert!(accuracy > promised - 0.05, "{accuracy} against the card's {promised}");
+    assert!(sure_wrong * 25 <= sure, "{sure_wrong} of {sure} sure answers are wrong");
+}
+
+fn copy_of_shipped() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    for name in [WEIGHTS_FILE, CARD_FILE] {
+        std::fs::copy(shipped().join(name), folder.path().join(name)).expect("the shipped model is there");
+    }
+    folder
+}
+
+/// Any flipped byte of the weights, a missing file, a card that is none: all refused by name.
+#[test]
+fn damaged_models_are_refused() {
+    let folder = copy_of_shipped();
+    let file = folder.path().join(WEIGHTS_FILE);
+    let sound = std::fs::read(&file).expect("readable");
+    for at in (0..sound.len()).step_by(sound.len() / 12) {
+        let mut damaged = sound.clone();
+        damaged[at] ^= 0x10;
+        std::fs::write(&file, &damaged).expect("writable");
+        match Model::load(folder.path()) {
+            Err(error @ ModelError::Hash { .. }) => {
+                let text = error.to_string();
+                assert!(text.contains(WEIGHTS_FILE) && text.contains("restore the file"), "{text}");
+            }
+            other => panic!("byte {at}: {other:?}"),
+        }
+    }
+    std::fs::remove_file(&file).expect("removable");
+    assert!(matches!(Model::load(folder.path()), Err(ModelError::Missing { .. })));
+    std::fs::write(folder.path().join(CARD_FILE), "{}").expect("writable");
+    assert!(matches!(Model::load(folder.path()), Err(ModelError::Card { .. })));
+}
+
+/// Weights of another shape, or with numbers that are none, are refused though their hash fits.
+#[test]
+fn foreign_models_are_refused() {
+    let folder = copy_of_shipped();
+    let file = folder.path().join(WEIGHTS_FILE);
+    let card_file = folder.path().join(CARD_FILE);
+    let sound = candle_core::safetensors::load(&file, &Device::Cpu).expect("readable");
+    let name = "class.out.bias";
+    for numbers in [vec![0.0_f32; 7], vec![f32::NAN; 8]] {
+        let mut tensors = sound.clone();
+        tensors.insert(name.into(), Tensor::new(numbers, &Device::Cpu).expect("small"));
+        candle_core::safetensors::save(&tensors, &file).expect("writable");
+        let mut card = crate::perception::Card::read(&card_file).expect("a card");
+        card.weights_blake3 = blake3::hash(&std::fs::read(&file).expect("readable")).to_hex().to_string();
+        card.write(&card_file).expect("writable");
+        match Model::load(folder.path()) {
+            Err(error @ ModelError::Shape { .. }) => {
+                assert!(error.to_string().contains(name), "{error}")
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+fn geometry(class: FeatureClass, [diameter, depth, length, width, pitch, angle]: [f64; 6]) -> FeatureGeometry {
+    FeatureGeometry { class, diameter, depth, length, width, pitch, angle, chamfer: 0.0 }
+}
+
+/// A cloud of a threaded bore in a plate, as the plant's camera sees it, from a known place.
+fn cloud_of_a_bore(request: u32, seq: u64) -> (Box<PointCloud>, Isometry3<f64>) {
+    let feature = geometry(FeatureClass::ThreadedHole, [0.016, 0.014, 0.0, 0.0, 0.002, 0.0]);
+    let part_from_feature = Isometry3::translation(0.0, 0.0, 0.01);
+    let solid = Solid::new(&Body::Box { size: [0.2, 0.2, 0.02] }, &feature, &part_from_feature);
+    let carrier = part_from_feature.inverse() * Isometry3::translation(0.0, 0.0, -0.01);
+    let surroundings = Surroundings::on_carrier(&carrier);
+    let base_from_feature = Isometry3::new(Vector3::new(0.4, -0.5, 0.07), Vector3::new(0.02, 0.0, 0.3));
+    let pose = feature_from_camera(0.35, TILT, 0.7, 0.0, [0.002, 0.001, 0.0]);
+    let view = View {
+        solid: &solid,
+        surroundings: &surroundings,
+        feature_from_camera: pose,
+        focus: 0.35,
+        half_width: half_width(&feature),
+    };
+    let mut cloud = Box::new(PointCloud::default());
+    Camera::default().scan(&view, &mut ChaCha8Rng::seed_from_u64(4), &mut cloud);
+    let base_from_camera = base_from_feature * pose;
+    let q = base_from_camera.rotation.quaternion();
+    cloud.base_from_camera =
+        Pose { position: base_from_camera.translation.vector.into(), rotation: [q.i, q.j, q.k, q.w] };
+    cloud.request = request;
+    cloud.header = Header { seq, ..Header::default() };
+    (cloud, base_from_feature)
+}
+
+/// The role answers a new cloud of a presented part once, repeatably, in the base frame.
+#[test]
+fn perception_answers_new_clouds_only_and_repeatably() {
+    let mut perception = Perception::load(&shipped()).expect("the shipped model is sound");
+    let mut feature = Feature::default();
+    let (nothing, _) = cloud_of_a_bore(0, 1);
+    perception.cycle(Stamp(1), &nothing, &mut feature);
+    assert_eq!(feature, Feature::default(), "nothing is presented");
+
+    let (cloud, base_from_feature) = cloud_of_a_bore(7, 2);
+    perception.cycle(Stamp(2), &cloud, &mut feature);
+    assert_eq!((feature.request, feature.cloud_seq), (7, 2));
+    assert_eq!(feature.class.get(), Some(FeatureClass::ThreadedHole), "{feature:?}");
+    assert_eq!(feature.recognition.get(), Some(Recognition::Sure), "{feature:?}");
+    let off = Vector3::from(feature.base_from_feature.position) - base_from_feature.translation.vector;
+    assert!(off.norm() < 1.5e-3, "{off:?}");
+    let sum: f32 = feature.probabilities.iter().sum();
+    assert!((sum - 1.0).abs() < 1e-5, "{sum}");
+
+    let first = feature;
+    feature.segment_count = 0;
+    perception.cycle(Stamp(3), &cloud, &mut feature);
+    assert_eq!(feature.segment_count, 0, "the same cloud is not looked at twice");
+    let mut again = Feature::default();
+    Perception::load(&shipped()).expect("sound").cycle(Stamp(9), &cloud, &mut again);
+    assert_eq!(first, again);
+}
+
+/// A faulty camera gets no answer, and no panic.
+#[test]
+fn unsound_clouds_show_no_part() {
+    let mut perception = Perception::load(&shipped()).expect("the shipped model is sound");
+    let (sound, _) = cloud_of_a_bore(1, 1);
+    let faults: [fn(&mut PointCloud); 6] = [
+        |c| c.points[17][1] = f32::NAN,
+        |c| c.points[17][1] = f32::INFINITY,
+        |c| c.point_count = u32::MAX,
+        |c| c.point_count = 100,
+        |c| c.points = [[0.1; 3]; tandem_msg::CLOUD_POINTS],
+        |c| c.base_from_camera.rotation = [0.0; 4],
+    ];
+    for (k, fault) in faults.iter().enumerate() {
+        let mut cloud = sound.clone();
+        cloud.header.seq = 10 + k as u64;
+        fault(&mut cloud);
+        let mut feature = Feature::default();
+        perception.cycle(Stamp(1), &cloud, &mut feature);
+        assert_eq!(feature.recognition.get(), Some(Recognition::NoPart), "fault {k}: {feature:?}");
+        assert_eq!(feature.cloud_seq, cloud.header.seq);
+    }
+}
+
+/// Every part of the S471 box, several looks each, a little off its place, with the noise of
+/// an inspection camera: recognised, and located within the tolerance of a grasp.
+#[test]
+fn the_parts_of_the_s471_box_are_recognised() {
+    use FeatureClass as C;
+    let plate = |x, y, z| Body::Box { size: [x, y, z] };
+    let parts = [
+        (
+            "bottom shell",
+            Body::Tray { size: [0.30, 0.40, 0.09], wall: 0.024, floor: 0.006 },
+            geometry(C::SmoothHole, [0.014, 0.030, 0.0, 0.0, 0.0, 0.0]),
+            [0.138, 0.0, 0.045],
+        ),
+        (
+            "sealing ring",
+            Body::Ring { outer: [0.30, 0.40], inner: [0.252, 0.352], height: 0.010 },
+            geometry(C::Slot, [0.0, 0.005, 0.120, 0.008, 0.0, 0.0]),
+            [0.138, 0.0, 0.005],
+        ),
+        (
+            "battery module",
+            plate(0.18, 0.28, 0.05),
+            geometry(C::SmoothAxis, [0.020, 0.030, 0.0, 0.0, 0.0, 0.0]),
+            [0.0, 0.115, 0.025],
+        ),
+        (
+            "heat guard plate",
+            plate(0.18, 0.20, 0.006),
+            geometry(C::Slot, [0.0, 0.005, 0.060, 0.012, 0.0, 0.0]),
+            [0.05, 0.0, 0.003],
+        ),
+        (
+            "fireproof guard plate",
+            plate(0.18, 0.20, 0.004),
+            geometry(C::Buckle, [0.0, 0.014, 0.030, 0.016, 0.0, 0.0]),
+            [0.06, 0.0, 0.002],
+        ),
+        (
+            "metal partition plate",
+            plate(0.18, 0.18, 0.006),
+            geometry(C::SmoothHole, [0.018, 0.006, 0.0, 0.0, 0.0, 0.0]),
+            [0.055, 0.055, 0.003],
+        ),
+        (
+            "top cover",
+            plate(0.30, 0.40, 0.016),
+            geometry(C::ThreadedHole, [0.016, 0.014, 0.0, 0.0, 0.002, 0.0]),
+            [-0.07, 0.0, 0.008],
+        ),
+        (
+            "fuse",
+            Body::Cylinder { radius: 0.020, height: 0.024 },
+            geometry(C::ThreadedAxis, [0.014, 0.022, 0.0, 0.0, 0.002, 0.0]),
+            [0.0, 0.0, 0.012],
+        ),
+        ("protective film", plate(0.16, 0.34, 0.001), geometry(C::Other, [0.0; 6]), [0.0, 0.0, 0.0005]),
+        (
+            "main cable",
+            Body::Cable { length: 0.26, radius: 0.009 },
+            geometry(C::Cone, [0.030, 0.028, 0.0, 0.0, 0.0, 0.30]),
+            [0.0, 0.13, 0.0],
+        ),
+    ];
+    let mut perception = Perception::load(&shipped()).expect("the shipped model is sound");
+    let mut right = 0;
+    let looks = 8;
+    for (name, body, feature, at) in &parts {
+        let cable = matches!(body, Body::Cable { .. });
+        let lying = Vector3::new(-std::f64::consts::FRAC_PI_2, 0.0, 0.0);
+        let upright =
+            if feature.class == C::Slot { Vector3::z() * std::f64::consts::FRAC_PI_2 } else { Vector3::zeros() };
+        let part_from_feature = Isometry3::new(Vector3::from(*at), if cable { lying } else { upright });
+        let solid = Solid::new(body, feature, &part_from_feature);
+        let down = if cable { 0.0155 } else { body.half_extents()[2] };
+        let carrier = part_from_feature.inverse() * Isometry3::translation(0.0, 0.0, -down);
+        let surroundings = Surroundings::on_carrier(&carrier);
+        let (mut hits, mut sure, mut worst) = (0, 0, 0.0_f64);
+        for look in 0..looks {
+            let mut rng = ChaCha8Rng::seed_from_u64(100 + look);
+            let swing = 0.7 * look as f64;
+            let (tilt, azimuth) = if cable { (0.8, -std::f64::consts::FRAC_PI_2) } else { (TILT, swing) };
+            let aim = [0.002 * swing.sin(), 0.002 * swing.cos(), 0.0];
+            let pose = feature_from_camera(0.35, tilt, azimuth, swing, aim);
+            let view = View {
+                solid: &solid,
+                surroundings: &surroundings,
+                feature_from_camera: pose,
+                focus: 0.35,
+                half_width: half_width(feature),
+            };
+            let mut cloud = Vec::new();
+            let camera = Camera { range_sigma: 1e-4, ..Camera::default() };
+            camera.render(&view, tandem_msg::CLOUD_POINTS, &mut rng, |p, _| cloud.push(p));
+            let answer = perception.recognise(&cloud).expect("enough points");
+            let probability = f64::from(answer.probabilities[answer.class.code() as usize]);
+            if answer.class == feature.class {
+                hits += 1;
+                sure += u32::from(probability >= perception.card().threshold && answer.fit.is_some());
+                if let (Some(fit), true) = (answer.fit, feature.class != C::Other) {
+                    let off = (pose * fit.camera_from_feature).translation.vector;
+                    worst = worst.max(off.norm());
+                }
+            }
+        }
+        println!("{name:>22}: {hits} of {looks} right, {sure} sure, worst position error {:.2} mm", worst * 1e3);
+        right += hits;
+    }
+    assert!(right as f64 >= 0.9 * (looks as f64 * parts.len() as f64), "{right} right");
+    assert_eq!(FeatureClass::ALL.len(), 8);
+}
