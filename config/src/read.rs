@@ -434,7 +434,7 @@ impl<'d> Table<'d> {
     /// The pose whose numbers stand directly in this table.
     pub(crate) fn own_pose(&self) -> Isometry3<f64> {
         const POSITION: Bound = bound("position_m", "m", -5.0, 5.0);
-        const TURN: Bound = bound("rpy_rad", "rad", -6.2832, 6.2832);
+        const TURN: Bound = bound("rpy_rad", "rad", -6.3, 6.3);
         let position: [f64; 3] = self.numbers(&POSITION);
         let [roll, pitch, yaw] = if self.has(TURN.key) { self.numbers(&TURN) } else { [0.0; 3] };
         Isometry3::from_parts(Translation3::from(position), UnitQuaternion::from_euler_angles(roll, pitch, yaw))

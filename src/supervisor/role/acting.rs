@@ -16,7 +16,7 @@ use tandem_msg::{
 impl Supervisor {
     pub(super) fn act(&mut self, inputs: &SupervisorInputs<'_>, passed: Duration, out: &mut SupervisorOutputs) {
         if self.work.current.is_none() && !self.next_operation(inputs, out) {
-            return self.complete(StepState::Done, inputs, out);
+            return self.complete(out);
         }
         let Some(mut current) = self.work.current.take() else { return };
         let result = match current.operation.clone() {
@@ -180,10 +180,8 @@ impl Supervisor {
                 planner: moved.then(|| current.planner.name()),
             },
         );
-        if let Operation::Motion(task) = &current.operation {
-            if task.action.is(EffectorAction::Grasp) {
-                self.surveyed.taken();
-            }
+        if matches!(&current.operation, Operation::Motion(task) if task.action.is(EffectorAction::Grasp)) {
+            self.surveyed.taken();
         }
     }
 
@@ -229,8 +227,8 @@ impl Supervisor {
     }
 
     /// The step is over, one way or the other.
-    fn complete(&mut self, state: StepState, _inputs: &SupervisorInputs<'_>, out: &mut SupervisorOutputs) {
-        let state = if self.work.take_over.is_some() { StepState::TakenOver } else { state };
+    fn complete(&mut self, out: &mut SupervisorOutputs) {
+        let state = if self.work.take_over.is_some() { StepState::TakenOver } else { StepState::Done };
         self.work.ended = Some(state);
         let index = self.work.index;
         self.surveyed.place(index, &self.cell.product.parts[index], &self.cell);
