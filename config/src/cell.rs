@@ -106,20 +106,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     let store = read_store(&root);
     let robot = read_robot(&root, folder, reading);
     let product = layout.as_ref().and_then(|layout| read_product(&root, product, folder, layout, reading));
-    let (mut reference, mut strategies) = (Vec::new(), Vec::new());
-    for file in root.texts("strategies") {
-        let file = beside(folder, &file);
-        let asked = root.fault_at("strategies", &format!("\"{}\"", file.display()), "a strategy file", "");
-        let Some(document) = reading.open(&file, Some(asked)) else {
-            continue;
-        };
-        let parsed = document.parse(reading);
-        let table = document.root(reading, &parsed);
-        if table.has("reference") {
-            reference.extend(strategy::read_reference(&table));
-        }
-        strategies.extend(strategy::read_strategies(&table));
-    }
+    let (reference, strategies) = read_strategies(&root, folder, reading);
     if reference.is_empty() || strategies.is_empty() {
         let found = format!("{} reference rows, {} strategies", reference.len(), strategies.len());
         root.refuse("strategies", &found, "at least one of each", "list the files of config/strategies");
@@ -219,6 +206,29 @@ fn read_product(
         reading.open(&properties, Some(table.fault_at("properties", &found, "a JSON file", "")))
     });
     Some(product::read(&table, properties.as_ref(), layout, reading))
+}
+
+/// Reads the strategy files: all reference rows first, for the strategies refer to them.
+fn read_strategies(root: &Table<'_>, folder: &Path, reading: &Reading) -> (Vec<ReferenceRow>, Vec<StrategyRow>) {
+    let documents: Vec<_> = root
+        .texts("strategies")
+        .iter()
+        .filter_map(|written| {
+            let file = beside(folder, written);
+            let found = format!("\"{}\"", file.display());
+            reading.open(&file, Some(root.fault_at("strategies", &found, "a strategy file", "")))
+        })
+        .collect();
+    let parsed: Vec<_> = documents.iter().map(|document| document.parse(reading)).collect();
+    let roots: Vec<_> =
+        documents.iter().zip(&parsed).map(|(document, parsed)| document.root(reading, parsed)).collect();
+    let reference: Vec<_> =
+        roots.iter().filter(|root| root.has("reference")).flat_map(strategy::read_reference).collect();
+    let mut strategies = Vec::new();
+    for root in &roots {
+        strategy::read_strategies(root, &reference, &mut strategies);
+    }
+    (reference, strategies)
 }
 
 /// A path as written in a file of `folder`, without detours.

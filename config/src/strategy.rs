@@ -268,9 +268,9 @@ pub(crate) fn read_reference(root: &Table<'_>) -> Vec<ReferenceRow> {
     rows
 }
 
-/// Reads `[[strategy]]`: one row for each class, mode and tool it names.
-pub(crate) fn read_strategies(root: &Table<'_>) -> Vec<StrategyRow> {
-    let mut rows: Vec<StrategyRow> = Vec::new();
+/// Reads `[[strategy]]`: one row for each class, mode and tool it names and the reference
+/// table leads to. Without `modes` or `tools` it is for all that the table leads to.
+pub(crate) fn read_strategies(root: &Table<'_>, reference: &[ReferenceRow], rows: &mut Vec<StrategyRow>) {
     for table in root.tables("strategy") {
         let name = table.text("name").unwrap_or_default();
         if !name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_') || name.len() > 32 {
@@ -284,8 +284,9 @@ pub(crate) fn read_strategies(root: &Table<'_>) -> Vec<StrategyRow> {
             steps.push(Step { subject: verb.subject(), verb });
         }
         check_sequence(&table, form, &steps);
-        let (classes, modes, tools) =
-            (names(&table, "classes"), names(&table, "modes"), names::<Tool>(&table, "tools"));
+        let classes: Vec<FeatureClass> = names(&table, "classes");
+        let modes: Option<Vec<AssemblyMode>> = table.has("modes").then(|| names(&table, "modes"));
+        let tools: Option<Vec<Tool>> = table.has("tools").then(|| names(&table, "tools"));
         let template = StrategyRow {
             id: String::new(),
             class: FeatureClass::Other,
@@ -300,19 +301,27 @@ pub(crate) fn read_strategies(root: &Table<'_>) -> Vec<StrategyRow> {
             flexible: flag_if(&table, "flexible"),
             steps,
         };
+        let before = rows.len();
         for &class in &classes {
-            for &mode in &modes {
-                for &tool in &tools {
-                    let id = format!("{name}/{class}/{mode}/{tool}");
-                    if rows.iter().any(|row| row.id == id) {
-                        table.refuse("name", &format!("\"{name}\""), "a row once", "give each strategy its own name");
-                    }
-                    rows.push(StrategyRow { id, class, mode, tool, ..template.clone() });
+            for found in reference.iter().filter(|found| found.class == class) {
+                let (mode, tool) = (found.mode, found.tool);
+                let wanted = modes.as_ref().is_none_or(|modes| modes.contains(&mode))
+                    && tools.as_ref().is_none_or(|tools| tools.contains(&tool));
+                let id = format!("{name}/{class}/{mode}/{tool}");
+                if !wanted || rows[before..].iter().any(|row| row.id == id) {
+                    continue;
                 }
+                if rows[..before].iter().any(|row| row.id == id) {
+                    table.refuse("name", &format!("\"{name}\""), "a name used once", "give each strategy its own name");
+                }
+                rows.push(StrategyRow { id, class, mode, tool, ..template.clone() });
             }
         }
+        if rows.len() == before && !classes.is_empty() && !reference.is_empty() {
+            let advice = "name classes, modes and tools that a row of the reference table leads to";
+            table.refuse("classes", &format!("{} classes", classes.len()), "a strategy that can be retrieved", advice);
+        }
     }
-    rows
 }
 
 /// A sequence must be one the dispatcher can carry out: it begins and ends with empty hands.

@@ -83,21 +83,30 @@ fn examine(cell: &Cell, store: Option<&str>) -> Vec<Finding> {
             result: Ok(format!("{}: {} joints", cell.robot.name, cell.robot.chain.joint_count())),
         },
     ];
-    let mut also = |subject, result: Result<String, String>| findings.push(Finding { subject, result });
-    also(
-        "model",
-        Perception::load(&cell.perception.model)
-            .map(|_| cell.perception.model.display().to_string())
-            .map_err(|e| e.to_string()),
-    );
-    also("controller", build_controller(cell).map(|_| "parameters accepted".to_owned()).map_err(|e| e.to_string()));
-    also("plant", Plant::new(cell, 0).map(|_| "simulation builds".to_owned()).map_err(|e| e.to_string()));
-    also(
-        "store",
-        store_url(store, cell)
-            .and_then(|url| Store::open(&url))
-            .map(|store| format!("{} answers, its tables are up to date", store.shown_url()))
-            .map_err(|e| e.to_string()),
-    );
+    findings.extend(roles(cell));
+    let store = store_url(store, cell)
+        .and_then(|url| Store::open(&url))
+        .map(|store| format!("{} answers, its tables are up to date", store.shown_url()))
+        .map_err(|error| error.to_string());
+    findings.push(Finding { subject: "store", result: store });
     findings
+}
+
+/// Builds the roles a run would build.
+fn roles(cell: &Cell) -> [Finding; 3] {
+    let model = Perception::load(&cell.perception.model);
+    let model = model.map(|_| cell.perception.model.display().to_string()).map_err(|error| error.to_string());
+    let controller = build_controller(cell).map(|_| "parameters accepted".to_owned()).map_err(|e| e.to_string());
+    let plant = Plant::new(cell, 0).map(|_| "simulation builds".to_owned()).map_err(|error| error.to_string());
+    [("model", model), ("controller", controller), ("plant", plant)]
+        .map(|(subject, result)| Finding { subject, result })
+}
+
+/// Refuses a cell whose roles would refuse their files, before anything starts.
+///
+/// # Errors
+/// What every role says, a line each.
+pub(super) fn refuse_unfit(cell: &Cell) -> Result<(), String> {
+    let refused: Vec<String> = roles(cell).into_iter().filter_map(|finding| finding.result.err()).collect();
+    if refused.is_empty() { Ok(()) } else { Err(refused.join("\n")) }
 }

@@ -4,6 +4,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::supervisor::{Event, EventKind};
 
+/// Heads the columns of the lines that [`step`] makes.
+const HEAD: &str = "[   cell   ] step                            by                   feature seen    conf.   mode    tool             duration  nearest";
+
 /// Shows the events of a run to a person.
 pub(super) struct Screen {
     bar: ProgressBar,
@@ -39,6 +42,7 @@ impl Screen {
             }
             EventKind::BoxStarted { number } => {
                 self.line(&format!("\n[{time:7.2} s] box {number} of {}", self.boxes));
+                self.line(&format!("{HEAD}"));
             }
             EventKind::StepStarted { label, .. } => self.bar.set_message(label.clone()),
             EventKind::ActionStarted { subject, subtask, part } => {
@@ -84,10 +88,21 @@ fn step(time: f64, kind: &EventKind) -> String {
     let clearance = clearance_min_m.map_or("      -".to_owned(), |clearance| format!("{:4.0} mm", clearance * 1e3));
     let tries = if *attempts > 1 { format!(", attempt {attempts}") } else { String::new() };
     let outcome = if *outcome == "done" { String::new() } else { format!(", {outcome}") };
+    let by = subject(who, form);
     format!(
-        "[{time:7.2} s] {step:2} {label:30} {who:6} {form:10} {class:13} {:5.1} %  {mode:7} {tool:16} {duration_s:5.1} s {clearance}{tries}{outcome}",
+        "[{time:7.2} s] {step:2} {label:29} {by:20} {class:13} {:5.1} %  {mode:7} {tool:16} {duration_s:5.1} s {clearance}{tries}{outcome}",
         confidence * 100.0
     )
+}
+
+/// Who did a step, and in which of the forms of Fig. 5.
+fn subject(who: &str, form: &str) -> String {
+    match (who, form) {
+        ("human", "hand_over") => "person, handed over".to_owned(),
+        ("human", "hold") => "person, robot holds".to_owned(),
+        ("human", _) => "person".to_owned(),
+        (who, _) => who.to_owned(),
+    }
 }
 
 /// What interrupts the even flow of steps; `None` for what only `--json` tells.

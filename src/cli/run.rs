@@ -51,6 +51,10 @@ pub(super) fn run(args: &RunArgs) -> u8 {
         Ok(cell) => cell,
         Err(faults) => return check::report_faults(&faults, args.json),
     };
+    if let Err(message) = check::refuse_unfit(&cell) {
+        anstream::eprintln!("{message}");
+        return exit::CONFIG;
+    }
     let record = record(args, &cell);
     let (mut store, library) = match open_store(args.store.as_deref(), &cell, &record) {
         Ok(opened) => opened,

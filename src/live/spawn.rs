@@ -7,7 +7,8 @@ use std::io::{self, BufRead, BufReader, Write};
 use std::os::unix::process::CommandExt;
 use std::path::PathBuf;
 use std::process::{Child, ChildStderr, Command, Stdio};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
 
 use tandem_msg::{Coded, Role};
 
@@ -15,6 +16,8 @@ use tandem_msg::{Coded, Role};
 const SELF: &str = "/proc/self/exe";
 /// Lines of standard error that are kept.
 const LINES: usize = 12;
+/// How long the last line of a process that has ended may be under way.
+const UNDER_WAY: Duration = Duration::from_millis(100);
 
 /// What every role process is started with.
 #[derive(Clone, Debug)]
@@ -31,21 +34,39 @@ pub(super) struct Plan {
 
 /// The last lines a process wrote to standard error.
 #[derive(Clone, Debug, Default)]
-pub(super) struct LastWords(Arc<Mutex<VecDeque<String>>>);
+pub(super) struct LastWords(Arc<(Mutex<Words>, Condvar)>);
+
+#[derive(Debug, Default)]
+struct Words {
+    lines: VecDeque<String>,
+    /// There will be no more.
+    ended: bool,
+}
 
 impl LastWords {
-    /// What it wrote last; empty when it wrote nothing.
+    /// What a process that has ended wrote last; empty when it wrote nothing.
     pub(super) fn read(&self) -> String {
-        let lines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        lines.iter().map(String::as_str).collect::<Vec<_>>().join("\n")
+        let (words, ended) = &*self.0;
+        let words = words.lock().unwrap_or_else(PoisonError::into_inner);
+        // The process is gone, but its last line may still be on its way.
+        let waited = ended.wait_timeout_while(words, UNDER_WAY, |words| !words.ended);
+        let (words, _) = waited.unwrap_or_else(PoisonError::into_inner);
+        words.lines.iter().map(String::as_str).collect::<Vec<_>>().join("\n")
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Words)) {
+        let (words, ended) = &*self.0;
+        change(&mut words.lock().unwrap_or_else(PoisonError::into_inner));
+        ended.notify_all();
     }
 
     fn add(&self, line: String) {
-        let mut lines = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if lines.len() == LINES {
-            lines.pop_front();
-        }
-        lines.push_back(line);
+        self.change(|words| {
+            if words.lines.len() == LINES {
+                words.lines.pop_front();
+            }
+            words.lines.push_back(line);
+        });
     }
 }
 
@@ -91,10 +112,13 @@ fn leash(parent: u32) -> io::Result<()> {
 }
 
 fn forward(role: Role, stderr: ChildStderr, kept: &LastWords) {
+    let mark = format!("{}: ", role.name());
     for line in BufReader::new(stderr).lines() {
-        let Ok(line) = line else { return };
+        let Ok(line) = line else { break };
+        let words = line.strip_prefix(&mark).unwrap_or(&line);
         // Our own standard error may be closed; the words are kept all the same.
-        let _ = writeln!(io::stderr(), "{}: {line}", role.name());
-        kept.add(line);
+        let _ = writeln!(io::stderr(), "{mark}{words}");
+        kept.add(words.to_owned());
     }
+    kept.change(|words| words.ended = true);
 }

@@ -109,6 +109,7 @@ pub(super) struct Arm {
     bodies: Vec<RigidBodyHandle>,
     joints: Vec<MultibodyJointHandle>,
     load: Option<LinkMass>,
+    driven: ([f64; JOINTS_MAX], [f64; JOINTS_MAX]),
     measured: Measured,
     base_from_link: [Isometry3<f64>; JOINTS_MAX + 1],
 }
@@ -154,6 +155,7 @@ impl Arm {
             measured: Measured::default(),
             base_from_link: [Isometry3::identity(); JOINTS_MAX + 1],
             load: None,
+            driven: ([f64::NAN; JOINTS_MAX], [f64::NAN; JOINTS_MAX]),
             bodies,
             joints,
             model,
@@ -182,8 +184,17 @@ impl Arm {
         self.model.joints.len()
     }
 
-    /// Sets what the motors strive for: rad, rad/s.
-    pub(super) fn drive(&self, world: &mut PhysicsWorld, position: &[f64; JOINTS_MAX], velocity: &[f64; JOINTS_MAX]) {
+    /// Sets what the motors strive for, rad and rad/s, and tells whether that is anything new.
+    pub(super) fn drive(
+        &mut self,
+        world: &mut PhysicsWorld,
+        position: &[f64; JOINTS_MAX],
+        velocity: &[f64; JOINTS_MAX],
+    ) -> bool {
+        if self.driven == (*position, *velocity) {
+            return false;
+        }
+        self.driven = (*position, *velocity);
         for (index, (&handle, model)) in self.joints.iter().zip(&self.model.joints).enumerate() {
             let Some((multibody, link)) = world.multibody_joints.get_mut(handle) else { continue };
             let Some(link) = multibody.link_mut(link) else { continue };
@@ -192,6 +203,12 @@ impl Arm {
             motor.target_pos = position[index];
             motor.target_vel = velocity[index];
         }
+        true
+    }
+
+    /// A cycle in which nothing moved.
+    pub(super) fn stand(&mut self) {
+        self.measured.velocity = [0.0; JOINTS_MAX];
     }
 
     /// Takes a load into the tool, or drops it: its mass and centre in the frame of the last link.

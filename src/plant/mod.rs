@@ -39,6 +39,7 @@ mod human;
 mod model;
 mod parts;
 mod referee;
+mod rest;
 pub mod solid;
 mod station;
 
@@ -48,11 +49,12 @@ mod tests;
 use arm::{Arm, GRAVITY};
 use drive::Drive;
 use effector::{Effector, Reach};
-use eye::Eye;
+pub use eye::Eye;
 use human::{Person, Sight, Tracker};
 use model::PlantModel;
 use parts::Parts;
 use referee::{Look, Referee};
+use rest::Rest;
 use station::Feeder;
 
 /// What the plant hears in a cycle: the latest of each.
@@ -80,6 +82,15 @@ pub struct PlantOutputs {
     pub scan_due: bool,
 }
 
+/// What the camera has to know for one picture. The truth; for [`Eye::scan`] only.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot {
+    /// The presented part and where it truly lies.
+    part: Option<(usize, Isometry3<f64>)>,
+    /// The request that presented it.
+    request: u32,
+}
+
 /// The simulated hardware of one cell.
 pub struct Plant {
     world: PhysicsWorld,
@@ -90,13 +101,15 @@ pub struct Plant {
     feeder: Feeder,
     person: Person,
     tracker: Tracker,
-    eye: Eye,
+    /// In the plant until it is taken out.
+    eye: Option<Eye>,
     referee: Referee,
     noise: ChaCha8Rng,
     luck: ChaCha8Rng,
     joint_noise: f64,
     period: Duration,
     loaded: Option<usize>,
+    rest: Rest,
     base_from_tcp: Isometry3<f64>,
 }
 
@@ -152,12 +165,13 @@ impl Plant {
             feeder: Feeder::new(model.feeder),
             person: Person::new(model.person, stream(seed, 1)),
             tracker: Tracker::new(model.tracking_sigma, stream(seed, 2)),
-            eye,
+            eye: Some(eye),
             noise: stream(seed, 3),
             luck: stream(seed, 4),
             joint_noise: model.joint_noise,
             period: model.period,
             loaded: None,
+            rest: Rest::default(),
             world,
             arm,
             drive,
@@ -203,15 +217,34 @@ impl Plant {
 
     /// The picture that was due: the presented part as the camera sees it. Leaves the header alone.
     pub fn scan(&mut self, cloud: &mut PointCloud) {
+        let shot = self.shot();
+        if let Some(eye) = &mut self.eye {
+            eye.scan(&shot, cloud);
+        }
+    }
+
+    /// What the camera has to know for the picture that is due.
+    pub fn shot(&self) -> Shot {
         let part = self.feeder.presented().map(|part| (part, self.parts.base_from_part(part)));
-        self.eye.scan(part, self.feeder.scan_request(), cloud);
+        Shot { part, request: self.feeder.scan_request() }
+    }
+
+    /// Takes the camera out of the plant. A picture takes it several cycles of the
+    /// plant; on a thread of its own it holds none of them up, as a real one would not.
+    /// From then on [`Plant::scan`] does nothing.
+    pub fn take_camera(&mut self) -> Option<Eye> {
+        self.eye.take()
     }
 
     fn move_arm(&mut self, now: Stamp, dt: f64, command: &JointCommand, outputs: &mut PlantOutputs) {
         let set_point = self.drive.cycle(now, dt, command, &self.arm.measured().position);
-        self.arm.drive(&mut self.world, &set_point.position, &set_point.velocity);
-        self.world.step();
-        self.arm.read(&self.world, dt);
+        let disturbed = self.arm.drive(&mut self.world, &set_point.position, &set_point.velocity);
+        if self.rest.asleep(disturbed || self.parts.falling(&self.world), self.arm.measured()) {
+            self.arm.stand();
+        } else {
+            self.world.step();
+            self.arm.read(&self.world, dt);
+        }
 
         let measured = self.arm.measured();
         let count = self.arm.joint_count();
@@ -236,6 +269,7 @@ impl Plant {
             self.loaded = self.parts.held();
             let load = self.parts.load(self.arm.flange_from_tcp());
             self.arm.set_load(&mut self.world, load);
+            self.rest.wake();
         }
     }
 

@@ -248,6 +248,12 @@ impl Parts {
         }
     }
 
+    /// Whether a part is on its way down.
+    pub(super) fn falling(&self, world: &PhysicsWorld) -> bool {
+        let awake = |item: &Item| world.bodies.get(item.body).is_some_and(|body| !body.is_sleeping());
+        self.items.iter().any(|item| item.place == Place::Lost && awake(item))
+    }
+
     /// What the held part adds to the arm's last link, in that link's frame.
     pub(super) fn load(&self, flange_from_tcp: &Isometry3<f64>) -> Option<LinkMass> {
         let item = self.items.get(self.held?)?;

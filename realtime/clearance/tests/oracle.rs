@@ -17,12 +17,12 @@ use tandem_msg::{Capsule, Pose, SceneObject, ShapeKind};
 const OFF: f64 = 1e-6;
 
 struct Robot {
-    name: &'static str,
     joints: usize,
     chain: Chain,
     capsules: Vec<LinkCapsule>,
     names: Vec<String>,
     self_pairs: Vec<[usize; 2]>,
+    scene_rows: Vec<Vec<String>>,
 }
 
 fn rows(file: &str) -> Vec<Vec<String>> {
@@ -76,7 +76,8 @@ fn robot(name: &'static str, joints: usize) -> Robot {
     };
     let self_pairs = rows(&format!("{name}_self_pairs.csv")).iter().map(|row| [link(&row[0]), link(&row[1])]).collect();
     let chain = Chain::new(&moving, pose(&numbers(&tool[1..]))).expect("a reference robot is a chain");
-    Robot { name, joints, chain, capsules, names, self_pairs }
+    let scene_rows = rows(&format!("{name}_scenes.csv"));
+    Robot { joints, chain, capsules, names, self_pairs, scene_rows }
 }
 
 impl Robot {
@@ -93,7 +94,7 @@ impl Robot {
     /// The objects of a scene and the person in it.
     fn scene(&self, id: &str) -> (Vec<SceneObject>, Vec<Capsule>) {
         let (mut objects, mut person) = (Vec::new(), Vec::new());
-        for row in rows(&format!("{}_scenes.csv", self.name)).iter().filter(|row| row[0] == id) {
+        for row in self.scene_rows.iter().filter(|row| row[0] == id) {
             let n = numbers(&row[4..]);
             if row[2] == "human" {
                 person.push(Capsule {
@@ -164,7 +165,8 @@ fn distances_agree_with_the_reference() {
                 assert!(distance <= 0.0, "{case}: {distance} m, reference {expected} m");
             } else {
                 assert!((distance - expected).abs() <= OFF, "{case}: {distance} m, reference {expected} m");
-                let person = rows(&format!("{name}_scenes.csv"))
+                let person = robot
+                    .scene_rows
                     .iter()
                     .any(|object| object[0] == row[1] && object[1] == reference[2] && object[2] == "human");
                 assert_eq!(nearest_is_person, person, "{case}: {clearance:?} {separation:?}");

@@ -119,9 +119,43 @@ pub(crate) struct Extremal {
 /// Relative error of an evaluated distance, in units of its largest term.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
+/// How far short of a distance counts as having covered it.
+///
+/// A motion recomputed every cycle from its own output collects roundings. Near a moving target there
+/// is nothing left with which to correct them, and a motion that misses by a rounding would go round
+/// once more.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tie {
+    /// Anywhere.
+    pub(crate) tight: f64,
+    /// At the top of the curve, from where it would be a long way round.
+    pub(crate) loose: f64,
+}
+
+/// How many times the rounding of the inputs is forgiven where the alternative is a jump.
+const LOOSE: f64 = 32768.0;
+
+impl Tie {
+    /// `rounding` is that of the inputs, `allowed` what the caller allows.
+    pub(crate) fn new(rounding: f64, allowed: f64) -> Self {
+        Tie {
+            tight: rounding + allowed,
+            loose: LOOSE * rounding + allowed,
+        }
+    }
+}
+
 impl Extremal {
     pub(crate) fn new(joint: Joint) -> Self {
-        let Joint { start: [v0, a0], end: [vf, af], peak, top, bottom, rise, fall } = joint;
+        let Joint {
+            start: [v0, a0],
+            end: [vf, af],
+            peak,
+            top,
+            bottom,
+            rise,
+            fall,
+        } = joint;
         let mean = (rise + fall) / 2.0;
         let k_start = v0 - rise * a0 * a0 / 2.0;
         let k_end = vf - rise * af * af / 2.0;
@@ -129,69 +163,125 @@ impl Extremal {
         let k_gain = (vf - v0) - rise * (af - a0) * (af + a0) / 2.0;
         let (high, hold_high) = climb(peak - k_start, top, mean);
         let (low, hold_low) = climb(peak - k_end, bottom, mean);
-        let peak_shape = Shape { high, low: -low, crest: peak, hold_high, cruise: 0.0, hold_low };
+        let peak_shape = Shape {
+            high,
+            low: -low,
+            crest: peak,
+            hold_high,
+            cruise: 0.0,
+            hold_low,
+        };
         let offset = rise * (af - a0);
-        let ramps = if mean == 0.0 { 0.0 } else { 2.0 * mean * (high + low) };
+        let ramps = if mean == 0.0 {
+            0.0
+        } else {
+            2.0 * mean * (high + low)
+        };
         let peak_time = (offset + ramps + hold_high + hold_low).max(0.0);
         let c = if mean == 0.0 { 0.0 } else { k_gain / mean };
-        Extremal { joint, k_start, k_end, c, mean, offset, peak_shape, peak_time }
+        Extremal {
+            joint,
+            k_start,
+            k_end,
+            c,
+            mean,
+            offset,
+            peak_shape,
+            peak_time,
+        }
     }
 
     /// The farthest motion of duration `time`, which must be a possible one ([`crate::swing`]).
     pub(crate) fn shape(&self, time: f64) -> Shape {
         if time >= self.peak_time {
-            return Shape { cruise: time - self.peak_time, ..self.peak_shape };
+            return Shape {
+                cruise: time - self.peak_time,
+                ..self.peak_shape
+            };
         }
-        let Joint { start: [_, a0], end: [_, af], top, bottom, .. } = self.joint;
+        let Joint {
+            start: [_, a0],
+            end: [_, af],
+            top,
+            bottom,
+            ..
+        } = self.joint;
         let (mean, c) = (self.mean, self.c);
         if mean == 0.0 {
             return self.both_held(time);
         }
         let s = (time - self.offset) / (2.0 * mean);
-        if s <= 0.0 {
-            // One rise from a0 to af, and nothing else.
-            let high = a0.min(af);
-            let crest = self.k_start + mean * high * high;
-            return Shape { high, low: high, crest, hold_high: 0.0, cruise: 0.0, hold_low: 0.0 };
-        }
-        let u = c / s;
+        let u = if s > 0.0 { c / s } else { 0.0 };
         let (above, below) = (s + u > 2.0 * top, s - u > 2.0 * bottom);
-        if !above && !below {
-            let (high, low) = ((s + u) / 2.0, (u - s) / 2.0);
-            let crest = (self.k_start + self.k_end + mean * (high * high + low * low)) / 2.0;
-            return Shape { high, low, crest, hold_high: 0.0, cruise: 0.0, hold_low: 0.0 };
-        }
         if above {
-            let fall = sqrt((2.0 * top * s - c).max(0.0));
-            let low = top - fall;
+            let low = top - sqrt((2.0 * top * s - c).max(0.0));
+            if low > af && top - af > s {
+                return self.turning(af + s, af);
+            }
             if low >= -bottom {
-                let hold_high = (2.0 * mean * (s - fall)).max(0.0);
-                return Shape {
-                    high: top,
-                    low,
-                    crest: self.k_end + mean * low * low,
-                    hold_high,
-                    cruise: 0.0,
-                    hold_low: 0.0,
-                };
+                return self.held_high(low.min(af), s);
             }
         }
         if below {
-            let fall = sqrt((2.0 * bottom * s + c).max(0.0));
-            let high = fall - bottom;
+            let high = sqrt((2.0 * bottom * s + c).max(0.0)) - bottom;
+            if high < a0 && a0 + bottom > s {
+                return self.turning(a0, a0 - s);
+            }
             if high <= top {
-                let hold_low = (2.0 * mean * (s - fall)).max(0.0);
-                return Shape {
-                    high,
-                    low: -bottom,
-                    crest: self.k_start + mean * high * high,
-                    hold_high: 0.0,
-                    cruise: 0.0,
-                    hold_low,
-                };
+                return self.held_low(high.max(a0), s);
             }
         }
-        self.both_held(time)
+        if above || below {
+            return self.both_held(time);
+        }
+        // The first rise and the last one cannot be shorter than nothing. They come out so by rounding
+        // where the whole is little more than one rise, and c / s means nothing.
+        if s + u < 2.0 * a0 {
+            self.turning(a0, (a0 - s).min(af))
+        } else if u - s > 2.0 * af {
+            self.turning((af + s).max(a0), af)
+        } else {
+            self.turning((s + u) / 2.0, (u - s) / 2.0)
+        }
+    }
+
+    /// The shape without holds.
+    fn turning(&self, high: f64, low: f64) -> Shape {
+        let crest = (self.k_start + self.k_end + self.mean * (high * high + low * low)) / 2.0;
+        Shape {
+            high,
+            low,
+            crest,
+            hold_high: 0.0,
+            cruise: 0.0,
+            hold_low: 0.0,
+        }
+    }
+
+    fn held_high(&self, low: f64, s: f64) -> Shape {
+        let (high, crest) = (self.joint.top, self.k_end + self.mean * low * low);
+        let hold_high = (2.0 * self.mean * (s - (high - low))).max(0.0);
+        Shape {
+            high,
+            low,
+            crest,
+            hold_high,
+            cruise: 0.0,
+            hold_low: 0.0,
+        }
+    }
+
+    fn held_low(&self, high: f64, s: f64) -> Shape {
+        let (low, crest) = (-self.joint.bottom, self.k_start + self.mean * high * high);
+        let hold_low = (2.0 * self.mean * (s - (high - low))).max(0.0);
+        Shape {
+            high,
+            low,
+            crest,
+            hold_high: 0.0,
+            cruise: 0.0,
+            hold_low,
+        }
     }
 
     fn both_held(&self, time: f64) -> Shape {
@@ -200,13 +290,33 @@ impl Extremal {
         let crest = (free + self.k_start / top + self.k_end / bottom) / (1.0 / top + 1.0 / bottom);
         let hold_high = ((crest - self.k_start) / top - self.mean * top).max(0.0);
         let hold_low = ((crest - self.k_end) / bottom - self.mean * bottom).max(0.0);
-        Shape { high: top, low: -bottom, crest, hold_high, cruise: 0.0, hold_low }
+        Shape {
+            high: top,
+            low: -bottom,
+            crest,
+            hold_high,
+            cruise: 0.0,
+            hold_low,
+        }
     }
 
     /// Distance covered by a shape.
     pub(crate) fn distance(&self, shape: &Shape) -> f64 {
-        let Joint { start: [_, a0], end: [_, af], rise, fall, .. } = self.joint;
-        let Shape { high: x, low: y, crest, hold_high, cruise, hold_low } = *shape;
+        let Joint {
+            start: [_, a0],
+            end: [_, af],
+            rise,
+            fall,
+            ..
+        } = self.joint;
+        let Shape {
+            high: x,
+            low: y,
+            crest,
+            hold_high,
+            cruise,
+            hold_low,
+        } = *shape;
         let (xx, yy) = (x * x, y * y);
         let mut distance = cruise * crest;
         if self.mean > 0.0 {
@@ -237,51 +347,73 @@ impl Extremal {
         }
     }
 
-    /// How exactly a distance at `time` is known.
-    pub(crate) fn tolerance(&self, time: f64) -> f64 {
-        let crest = self
-            .joint
-            .peak
-            .abs()
-            .min(self.k_start.abs() + self.k_end.abs() + self.joint.top.min(self.joint.bottom) * time);
-        ROUNDING * time * (self.k_start.abs() + self.k_end.abs() + crest)
+    /// How exactly the distance covered by a shape of duration `time` is known.
+    fn tolerance(&self, time: f64, shape: &Shape) -> f64 {
+        ROUNDING * time * (self.k_start.abs() + self.k_end.abs() + shape.crest.abs())
+    }
+
+    /// Distance covered in `time`, and how exactly it is known.
+    pub(crate) fn distance_known(&self, time: f64) -> (f64, f64) {
+        let shape = self.shape(time);
+        (self.distance(&shape), self.tolerance(time, &shape))
     }
 
     /// The first duration in `[from, to]` at which `distance` is covered, when less is covered at
-    /// `from`. Less than `tie` short of it counts as covered.
-    pub(crate) fn first_covering(&self, distance: f64, tie: f64, from: f64, to: f64) -> Option<f64> {
+    /// `from`.
+    pub(crate) fn first_covering(
+        &self,
+        distance: f64,
+        tie: Tie,
+        from: f64,
+        to: f64,
+    ) -> Option<f64> {
         let mut marks = Marks::between(from, to.min(self.peak_time));
         if from < self.peak_time {
             self.mark_pieces(&mut marks);
             marks.push(to.min(self.peak_time));
         }
-        let mut piece_start = from;
+        let (mut piece_start, mut before) = (from, self.distance_in(from));
         for &mark in marks.sorted() {
             let covered = self.distance_in(mark);
-            if covered >= distance - tie {
+            if covered >= distance - tie.tight {
                 let exact = |time: f64| {
                     let shape = self.shape(time);
-                    (self.distance(&shape) - distance, self.slope(&shape))
+                    let off = self.distance(&shape) - distance;
+                    let known = off.abs() <= self.tolerance(time, &shape) / 16.0;
+                    (if known { 0.0 } else { off }, self.slope(&shape))
                 };
                 return Some(if covered <= distance {
                     mark
                 } else {
-                    root_between(exact, self.tolerance(mark) / 16.0, piece_start, mark)
+                    root_between(exact, piece_start, mark)
                 });
             }
-            piece_start = mark;
+            if covered < before && before >= distance - tie.loose {
+                return Some(piece_start);
+            }
+            (piece_start, before) = (mark, covered);
         }
-        if to <= self.peak_time || self.joint.peak <= 0.0 {
-            return None;
+        if to > self.peak_time && self.joint.peak > 0.0 {
+            let begin = from.max(self.peak_time);
+            let time = begin + (distance - self.distance_in(begin)).max(0.0) / self.joint.peak;
+            if time <= to {
+                return Some(time);
+            }
         }
-        let begin = from.max(self.peak_time);
-        let time = begin + (distance - self.distance_in(begin)).max(0.0) / self.joint.peak;
-        (time <= to).then_some(time)
+        (before >= distance - tie.loose).then_some(piece_start)
     }
 
     /// Marks every duration at which the formula or the sign of the slope of P changes.
     fn mark_pieces(&self, marks: &mut Marks) {
-        let Joint { start: [v0, _], end: [vf, _], top, bottom, rise, fall, .. } = self.joint;
+        let Joint {
+            start: [v0, _],
+            end: [vf, _],
+            top,
+            bottom,
+            rise,
+            fall,
+            ..
+        } = self.joint;
         let (mean, c, k_start, k_end) = (self.mean, self.c, self.k_start, self.k_end);
         if mean == 0.0 {
             marks.push(-v0 / top - vf / bottom);
@@ -305,7 +437,10 @@ impl Extremal {
             mark((both - c) / (2.0 * bottom));
             // Slope with both held: w = -beta A B / 2.
             let crest = -fall * top * bottom / 2.0;
-            mark(((crest - k_start) / top + (crest - k_end) / bottom) / (2.0 * mean) + (top + bottom) / 2.0);
+            mark(
+                ((crest - k_start) / top + (crest - k_end) / bottom) / (2.0 * mean)
+                    + (top + bottom) / 2.0,
+            );
         }
         // Slope without hold: (alpha + 2 beta) s^4 + 4 (K0 + Kf) s^2 + alpha c^2 = 0.
         for square in quadratic(rise + 2.0 * fall, 2.0 * (k_start + k_end), rise * c * c) {
@@ -328,8 +463,21 @@ impl Extremal {
 
     /// The constant-jerk parts of a shape, in order; some may have no duration.
     pub(crate) fn phases(&self, shape: &Shape) -> [Phase; 7] {
-        let Joint { start: [v0, a0], end: [_, af], rise, fall, .. } = self.joint;
-        let Shape { high: x, low: y, crest, hold_high, cruise, hold_low } = *shape;
+        let Joint {
+            start: [v0, a0],
+            end: [_, af],
+            rise,
+            fall,
+            ..
+        } = self.joint;
+        let Shape {
+            high: x,
+            low: y,
+            crest,
+            hold_high,
+            cruise,
+            hold_low,
+        } = *shape;
         let phase = |duration: f64, velocity: f64, acceleration: f64, slope: i8| Phase {
             duration,
             velocity,
@@ -395,7 +543,12 @@ struct Marks {
 
 impl Marks {
     fn between(from: f64, to: f64) -> Self {
-        Marks { times: [0.0; 16], count: 0, from, to }
+        Marks {
+            times: [0.0; 16],
+            count: 0,
+            from,
+            to,
+        }
     }
 
     /// Keeps `time` if it lies inside; NaN does not.

@@ -50,6 +50,9 @@ pub struct Input<const N: usize> {
     pub target: [State; N],
     /// Limits of each joint.
     pub limits: [Limits; N],
+    /// How far from its target position a joint may end where more exactness would cost time, as when
+    /// the start is measured with noise. 0 asks for the target to within rounding.
+    pub tolerance: [f64; N],
     /// The shortest duration wanted, in seconds; 0 for none.
     pub minimum_duration: f64,
     /// If above 0, durations are whole multiples of it, in seconds.
@@ -69,6 +72,7 @@ impl<const N: usize> Default for Input<N> {
             start: [State::default(); N],
             target: [State::default(); N],
             limits: [Limits::default(); N],
+            tolerance: [0.0; N],
             minimum_duration: 0.0,
             duration_step: 0.0,
             enabled: [true; N],
@@ -78,20 +82,55 @@ impl<const N: usize> Default for Input<N> {
     }
 }
 
+/// The part of an input that concerns one joint.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct JointInput {
+    pub(crate) interface: Interface,
+    pub(crate) start: State,
+    pub(crate) target: State,
+    pub(crate) limits: Limits,
+    pub(crate) tolerance: f64,
+}
+
+impl<const N: usize> Input<N> {
+    pub(crate) fn joint(&self, index: usize) -> JointInput {
+        JointInput {
+            interface: self.interface[index],
+            start: self.start[index],
+            target: self.target[index],
+            limits: self.limits[index],
+            tolerance: self.tolerance[index].max(0.0),
+        }
+    }
+}
+
 /// The limits of one joint as the solver wants them, after a check.
-pub(crate) fn joint(
-    index: usize,
-    interface: Interface,
-    start: &State,
-    target: &State,
-    limits: &Limits,
-) -> Result<Joint, Error> {
-    if !start.is_finite() || !target.is_finite() {
+pub(crate) fn check(index: usize, input: &JointInput) -> Result<Joint, Error> {
+    let JointInput {
+        interface,
+        start,
+        target,
+        limits,
+        ..
+    } = input;
+    let interface = *interface;
+    if !start.is_finite() || !target.is_finite() || !input.tolerance.is_finite() {
         return Err(Error::NotFinite { joint: index });
     }
-    let Limits { velocity_min, velocity_max, acceleration_min, acceleration_max, jerk_min, jerk_max } = *limits;
-    let velocities = velocity_min <= 0.0 && velocity_max >= 0.0 && velocity_min.is_finite() && velocity_max.is_finite();
-    let signs = acceleration_min < 0.0 && acceleration_max > 0.0 && jerk_min < 0.0 && jerk_max > 0.0;
+    let Limits {
+        velocity_min,
+        velocity_max,
+        acceleration_min,
+        acceleration_max,
+        jerk_min,
+        jerk_max,
+    } = *limits;
+    let velocities = velocity_min <= 0.0
+        && velocity_max >= 0.0
+        && velocity_min.is_finite()
+        && velocity_max.is_finite();
+    let signs =
+        acceleration_min < 0.0 && acceleration_max > 0.0 && jerk_min < 0.0 && jerk_max > 0.0;
     if !signs || (interface == Interface::Position && !velocities) {
         return Err(Error::Limits { joint: index });
     }
@@ -104,6 +143,9 @@ pub(crate) fn joint(
         rise: 1.0 / jerk_max,
         fall: -1.0 / jerk_min,
     };
+    if !joint.rise.is_finite() || !joint.fall.is_finite() {
+        return Err(Error::OutOfRange { joint: index });
+    }
     let (v, a) = (target.velocity, target.acceleration);
     let over = |value: f64, limit: f64| value - limit > TIE * (value.abs() + limit.abs());
     if interface == Interface::Position && (over(v, velocity_max) || over(-v, -velocity_min)) {
@@ -115,9 +157,19 @@ pub(crate) fn joint(
     if over(a, acceleration_max) || over(-a, -acceleration_min) {
         return Err(Error::TargetAcceleration { joint: index });
     }
-    let before = if a < 0.0 { v + joint.fall * a * a / 2.0 } else { v };
-    let after = if a > 0.0 { v - joint.rise * a * a / 2.0 } else { v };
-    if interface == Interface::Position && (over(before, velocity_max) || over(-after, -velocity_min)) {
+    let before = if a < 0.0 {
+        v + joint.fall * a * a / 2.0
+    } else {
+        v
+    };
+    let after = if a > 0.0 {
+        v - joint.rise * a * a / 2.0
+    } else {
+        v
+    };
+    if interface == Interface::Position
+        && (over(before, velocity_max) || over(-after, -velocity_min))
+    {
         return Err(Error::TargetAcceleration { joint: index });
     }
     Ok(joint)

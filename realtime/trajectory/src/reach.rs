@@ -13,20 +13,34 @@
 //! because each limit holds for both and is convex. Its jerk takes at most 13 constant values.
 
 use crate::{
-    extremal::{Extremal, Joint, Shape},
-    swing::{Durations, Swing},
+    extremal::{Extremal, Joint, Phase, Shape, Tie},
+    swing::{ARRIVAL_SHARE, Durations, Swing},
 };
+
+/// Durations this close, relatively, differ by rounding.
+const ARRIVAL_TIE: f64 = 8.0 * f64::EPSILON;
+
+/// The same share of the distance that is run without the jerk.
+const ARRIVAL_RUN: f64 = 1e-6;
+
+/// Roundings that a motion recomputed from its own output collects in its last moments.
+const ROUNDINGS: f64 = 64.0;
 
 /// One joint's position problem: its velocity problem and the distance to cover.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach {
-    pub(crate) far: Extremal,
+    far: Extremal,
     /// Every sign turned, so that it, too, is a farthest motion.
-    pub(crate) near: Extremal,
+    near: Extremal,
     durations: Durations,
     distance: f64,
     /// Rounding of the distance itself.
-    tie: f64,
+    rounding: f64,
+    /// How far from the distance is near enough.
+    allowed: f64,
+    /// How long the rest takes if one jerk does it up to roundings, else negative. A motion recomputed
+    /// every cycle from its own output ends like that, with nothing left to correct its roundings.
+    arrival: f64,
 }
 
 /// A motion of given duration as a mixture of the two extremal ones.
@@ -39,21 +53,57 @@ pub(crate) struct Mixture {
 }
 
 impl Reach {
-    /// `distance` is known to within `tie`; `velocity_min` is the lowest velocity of the joint.
-    pub(crate) fn new(joint: Joint, velocity_min: f64, distance: f64, tie: f64) -> Self {
+    /// `distance` is known to within `rounding`, and `allowed` off it is near enough; `velocity_min` is the lowest velocity of the joint.
+    pub(crate) fn new(
+        joint: Joint,
+        velocity_min: f64,
+        distance: f64,
+        rounding: f64,
+        allowed: f64,
+    ) -> Self {
         let velocities = joint.start[0].abs() + joint.end[0].abs();
         let near = joint.mirrored(-velocity_min);
+        let (far, near) = (Extremal::new(joint), Extremal::new(near));
+        let swing = Swing::of(&joint);
+        let arrival = swing
+            .straight(velocities, joint.peak.max(-velocity_min))
+            .filter(|time| {
+                let off = distance - swing.straight_distance(*time, joint.start[0]);
+                let rounding = rounding + far.distance_known(*time).1;
+                let tie = Tie::new(rounding, allowed);
+                let bend = (joint.end[1] - joint.start[1]).abs() * time * time;
+                let run = (joint.start[0].abs() + joint.end[0].abs()) * time;
+                let work = (ARRIVAL_SHARE * bend).max(ARRIVAL_RUN * run);
+                off.abs() <= tie.tight + ROUNDINGS * rounding + tie.loose.min(work)
+            });
+        let durations = swing.durations(velocities);
+        let arrival = arrival.unwrap_or(-1.0);
         Reach {
-            far: Extremal::new(joint),
-            near: Extremal::new(near),
-            durations: Swing::of(&joint).durations(velocities),
+            far,
+            near,
+            durations,
             distance,
-            tie,
+            rounding,
+            allowed,
+            arrival,
         }
+    }
+
+    /// How long the rest takes, if one jerk does it up to roundings.
+    pub(crate) fn arrival(&self) -> Option<f64> {
+        (self.arrival >= 0.0).then_some(self.arrival)
+    }
+
+    /// Whether one jerk does the rest in no less than `time`.
+    fn arrives_by(&self, time: f64) -> bool {
+        time <= self.arrival * (1.0 + ARRIVAL_TIE)
     }
 
     /// The first possible duration not below `time`, or `None` if the target is never reached.
     pub(crate) fn next(&self, time: f64) -> Option<f64> {
+        if self.arrives_by(time) {
+            return Some(time.max(self.arrival));
+        }
         let time = self.durations.next(time);
         let end = self.durations.end(time);
         let found = self.next_before(time, end);
@@ -69,14 +119,17 @@ impl Reach {
     /// If the distance lies above the interval at `from`, it enters it by crossing the upper end, and
     /// the lower end is no obstacle there, being lower; and the other way round.
     fn next_before(&self, from: f64, to: f64) -> Option<f64> {
-        let tie = self.tie + self.far.tolerance(from);
-        if self.distance > self.far.distance_in(from) + tie {
-            self.far.first_covering(self.distance, tie, from, to)
-        } else if -self.distance > self.near.distance_in(from) + tie {
-            self.near.first_covering(-self.distance, tie, from, to)
-        } else {
-            Some(from)
+        let (high, known) = self.far.distance_known(from);
+        let tie = Tie::new(self.rounding + known, self.allowed);
+        if self.distance > high + tie.tight {
+            return self.far.first_covering(self.distance, tie, from, to);
         }
+        let (low, known) = self.near.distance_known(from);
+        let tie = Tie::new(self.rounding + known, self.allowed);
+        if -self.distance > low + tie.tight {
+            return self.near.first_covering(-self.distance, tie, from, to);
+        }
+        Some(from)
     }
 
     /// The motion that takes `time`, which must be a possible duration.
@@ -91,5 +144,16 @@ impl Reach {
             (self.distance - low) / (high - low)
         };
         Mixture { far, near, share }
+    }
+}
+
+impl Mixture {
+    /// The phases of the two motions, the nearest one with its signs turned, and the share of the first.
+    pub(crate) fn phases(&self, reach: &Reach) -> ([Phase; 7], [Phase; 7], f64) {
+        (
+            reach.far.phases(&self.far),
+            reach.near.phases(&self.near),
+            self.share,
+        )
     }
 }

@@ -8,7 +8,7 @@
 
 use crate::{
     error::Error,
-    input::{Input, Interface},
+    input::{Input, Interface, JointInput},
     profile::Profile,
     state::{Limits, State},
     task::Task,
@@ -21,6 +21,8 @@ const TIE: f64 = 64.0 * f64::EPSILON;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line<const N: usize> {
     pub(crate) task: Task,
+    /// The joint whose coordinate is that of the line.
+    pub(crate) leader: usize,
     /// Share of each joint in the line coordinate; 0 for a joint that does not move.
     direction: [f64; N],
 }
@@ -80,33 +82,79 @@ impl<const N: usize> Line<N> {
                 tighten(&mut limits, own, direction[i]);
             }
         }
-        let distance = quantities[0][leader];
-        let start = State { position: 0.0, ..input.start[leader] };
-        let target = State { position: distance, ..input.target[leader] };
-        Ok(Line { task: Task::new(leader, input.interface[leader], &start, &target, &limits)?, direction })
+        let own = input.joint(leader);
+        let start = State {
+            position: 0.0,
+            ..own.start
+        };
+        let target = State {
+            position: quantities[0][leader],
+            ..own.target
+        };
+        let task = Task::new(
+            leader,
+            &JointInput {
+                start,
+                target,
+                limits,
+                ..own
+            },
+        )?;
+        Ok(Line {
+            task,
+            leader,
+            direction,
+        })
     }
 
-    /// The motion of joint `index`, given that of the line coordinate.
-    pub(crate) fn profile(&self, index: usize, line: &Profile, input: &Input<N>, minimum: f64) -> Profile {
+    /// The motion of joint `index`, given that of the line coordinate, unless it leaves the range of
+    /// doubles.
+    pub(crate) fn profile(
+        &self,
+        index: usize,
+        line: &Profile,
+        input: &Input<N>,
+        minimum: f64,
+    ) -> Option<Profile> {
         let held = input.interface[index] == Interface::Position;
-        line.scaled(self.direction[index], input.start[index].position, &input.target[index], held, minimum)
+        let start = input.start[index].position;
+        let profile = line.scaled(
+            self.direction[index],
+            start,
+            &input.target[index],
+            held,
+            minimum,
+        );
+        profile.extent(0.0, 0.0).is_finite().then_some(profile)
     }
 }
 
 /// Narrows the limits of the line coordinate to what a joint with the share `direction` can do.
 fn tighten(limits: &mut Limits, own: &Limits, direction: f64) {
     let both = |low: f64, high: f64| {
-        if direction > 0.0 { (low / direction, high / direction) } else { (high / direction, low / direction) }
+        if direction > 0.0 {
+            (low / direction, high / direction)
+        } else {
+            (high / direction, low / direction)
+        }
     };
     let narrow = |low: &mut f64, high: &mut f64, own: (f64, f64)| {
         *low = low.max(own.0);
         *high = high.min(own.1);
     };
-    narrow(&mut limits.velocity_min, &mut limits.velocity_max, both(own.velocity_min, own.velocity_max));
+    narrow(
+        &mut limits.velocity_min,
+        &mut limits.velocity_max,
+        both(own.velocity_min, own.velocity_max),
+    );
     narrow(
         &mut limits.acceleration_min,
         &mut limits.acceleration_max,
         both(own.acceleration_min, own.acceleration_max),
     );
-    narrow(&mut limits.jerk_min, &mut limits.jerk_max, both(own.jerk_min, own.jerk_max));
+    narrow(
+        &mut limits.jerk_min,
+        &mut limits.jerk_max,
+        both(own.jerk_min, own.jerk_max),
+    );
 }

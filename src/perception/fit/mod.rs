@@ -26,7 +26,7 @@ use super::sample::Sample;
 use plane::Plane;
 
 /// Dense points that take part in a fit, at most.
-const DENSE: usize = 5_000;
+const DENSE: usize = 10_000;
 /// Feature points below which nothing is fitted.
 const SEGMENT_MIN: usize = 8;
 
@@ -91,11 +91,19 @@ pub fn fit(cloud: &[[f32; 3]], sample: &Sample, segment: &[bool], class: Feature
     if class == FeatureClass::Other || dense.feature.len() < SEGMENT_MIN {
         return surface.map(|plane| bare(&plane, &dense));
     }
-    match class {
+    let fit = match class {
         FeatureClass::Slot => slot::fit(&surface?, &dense),
         FeatureClass::Buckle => hook::fit(&surface?, &dense),
-        _ => round::fit(surface.as_ref(), sample, segment, &dense, class, &mut rng),
-    }
+        _ => round::fit(surface.as_ref(), cloud, sample, segment, &dense, class, &mut rng),
+    };
+    fit.filter(|fit| near(fit, &dense.feature))
+}
+
+/// Whether the origin lies where the feature's points are: a fit that ran away is none.
+fn near(fit: &Fit, feature: &[Vector3<f64>]) -> bool {
+    let middle = feature.iter().sum::<Vector3<f64>>() / feature.len() as f64;
+    let mut reach: Vec<f64> = feature.iter().map(|p| (p - middle).norm()).collect();
+    (fit.camera_from_feature.translation.vector - middle).norm() < 2.0 * quantile(&mut reach, 0.9)
 }
 
 /// Where there is no feature to locate: the point of the surface the camera looks at, or the

@@ -51,7 +51,7 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         }
         // Both ends, near the middle line.
         let y_mid = 0.5 * (edge_y[0] + edge_y[1]);
-        let strip = 0.2 * (edge_y[1] - edge_y[0]).max(2.0 * spacing);
+        let strip = 0.25 * (edge_y[1] - edge_y[0]).max(2.0 * spacing);
         let ends = gap(plate.iter().filter(|p| (p.y - y_mid).abs() < strip).map(|p| p.x), mid.x, x1 - x0);
         length_seen = ends.is_some();
         let edge_x = ends.unwrap_or([x0, x1]);

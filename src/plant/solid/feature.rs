@@ -168,7 +168,10 @@ impl FeatureSolid {
                 let rho = (x * x + y * y).sqrt();
                 let rod = thread.as_ref().map_or(rho - radius, |t| t.rod(x, y, z, rho));
                 let bevel = (rho - radius + z - height + chamfer) * DIAGONAL;
-                extrude(rod, z - height).max(bevel).max(-z - ROOT)
+                // The profile above the end is none: its distance must not be added to the height.
+                let end = z - height;
+                let trunk = if thread.is_some() { rod.max(end) } else { extrude(rod, end) };
+                trunk.max(bevel).max(-z - ROOT)
             }
             Shape::Slot { half_run, radius, depth, chamfer } => {
                 let along = (x.abs() - half_run).max(0.0);

@@ -12,6 +12,7 @@ use tandem_msg::{
 use super::parts::Place;
 use super::*;
 
+mod assembly;
 mod handling;
 mod person;
 mod watchdog;

@@ -39,6 +39,6 @@ impl Store {
         rows.iter()
             .map(read)
             .collect::<Result<_, _>>()
-            .map_err(|error| StoreError::failed(&self.url, "list the runs", &error))
+            .map_err(|error| StoreError::failed(&self.target.given, "list the runs", &error))
     }
 }

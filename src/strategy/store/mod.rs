@@ -22,8 +22,8 @@ pub use journal::RunRecord;
 pub use url::{default_url, shown};
 
 use super::{JournalEntry, Library};
-use sqlx::AnyPool;
 use sqlx::any::AnyPoolOptions;
+use sqlx::{AnyPool, Connection};
 use std::future::Future;
 use std::time::Duration;
 use tandem_config::StrategyRow;
@@ -39,7 +39,7 @@ pub const OPERATION_MAX: Duration = Duration::from_secs(40);
 pub struct Store {
     runtime: Runtime,
     pool: AnyPool,
-    url: String,
+    target: url::Target,
 }
 
 impl Store {
@@ -54,11 +54,9 @@ impl Store {
         let runtime =
             tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(StoreError::Runtime)?;
         let pool = Self::within(&runtime, url, "open the database", connect(&target))?;
-        let store = Self { runtime, pool, url: url.to_owned() };
-        {
-            let _lock = schema::FileLock::take(&target)?;
-            store.run("bring the tables up to date", schema::migrate(&store.pool, &target))?;
-        }
+        let store = Self { runtime, pool, target };
+        let migrate = schema::migrate(&store.pool, &store.target);
+        store.run("bring the tables up to date", schema::alone(&store.pool, &store.target, migrate))?;
         Ok(store)
     }
 
@@ -68,7 +66,8 @@ impl Store {
     /// # Errors
     /// The database does not answer, or a number is not finite.
     pub fn seed(&self, rows: &[StrategyRow]) -> Result<(), StoreError> {
-        self.run("store the strategy files", library::sync(&self.pool, rows))
+        let sync = library::sync(&self.pool, rows);
+        self.run("store the strategy files", schema::alone(&self.pool, &self.target, sync))
     }
 
     /// The whole strategy library.
@@ -123,11 +122,11 @@ impl Store {
 
     /// The URL without its password.
     pub fn shown_url(&self) -> String {
-        shown(&self.url)
+        shown(&self.target.given)
     }
 
     fn run<T>(&self, what: &'static str, work: impl Future<Output = Result<T, StoreError>>) -> Result<T, StoreError> {
-        Self::within(&self.runtime, &self.url, what, work)
+        Self::within(&self.runtime, &self.target.given, what, work)
     }
 
     /// Runs `work` to its end or to [`OPERATION_MAX`], and says in a fault where and what it was.
@@ -156,6 +155,15 @@ impl Drop for Store {
 
 async fn connect(target: &url::Target) -> Result<AnyPool, StoreError> {
     let sqlite = target.sqlite();
+    // A pool keeps trying and then says only that it took too long: one plain connection
+    // first tells what is wrong.
+    if target.file.is_some() || !sqlite {
+        let mut probe = sqlx::AnyConnection::connect(&target.url).await?;
+        if sqlite {
+            sqlx::query("PRAGMA schema_version").fetch_one(&mut probe).await?;
+        }
+        probe.close().await?;
+    }
     Ok(AnyPoolOptions::new()
         .max_connections(2)
         .acquire_timeout(ACQUIRE_MAX)

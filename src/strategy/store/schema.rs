@@ -9,48 +9,64 @@ use sqlx::AnyPool;
 use sqlx::migrate::{MigrateError, Migrator};
 use sqlx::pool::PoolConnection;
 use sqlx::{Any, Row};
-use std::fs::File;
+use std::fs::{File, TryLockError};
+use std::path::Path;
+use std::time::{Duration, Instant};
 
 static MIGRATIONS: Migrator = sqlx::migrate!("src/strategy/store/migrations");
 
 const LOCK: &str = "SELECT GET_LOCK('tandem_migrate', 30)";
 const UNLOCK: &str = "SELECT RELEASE_LOCK('tandem_migrate')";
 
-/// Holds `<database>.lock` while it lives; nothing where there is no file.
-pub(super) struct FileLock {
-    _file: Option<File>,
+/// Longest wait for another process that changes tables or library.
+const LOCK_MAX: Duration = Duration::from_secs(30);
+
+/// Does `work` while no other process changes tables or library.
+pub(super) async fn alone<T>(
+    pool: &AnyPool,
+    target: &Target,
+    work: impl Future<Output = Result<T, StoreError>>,
+) -> Result<T, StoreError> {
+    if let Some(database) = &target.file {
+        let _lock = lock_beside(database).await?;
+        return work.await;
+    }
+    if target.sqlite() {
+        return work.await;
+    }
+    let mut connection = pool.acquire().await?;
+    let locked: Option<i64> = sqlx::query(LOCK).fetch_one(&mut *connection).await?.try_get(0)?;
+    if locked != Some(1) {
+        return Err(StoreError::Locked);
+    }
+    let done = work.await;
+    sqlx::query(UNLOCK).fetch_one(&mut *connection).await?;
+    done
 }
 
-impl FileLock {
-    /// Waits until no other process has it.
-    pub(super) fn take(target: &Target) -> Result<Self, StoreError> {
-        let Some(database) = &target.file else {
-            return Ok(Self { _file: None });
-        };
-        let mut path = database.clone().into_os_string();
-        path.push(".lock");
-        let fault = |error: std::io::Error| StoreError::Folder {
-            path: path.to_string_lossy().into_owned(),
-            why: error.to_string(),
-        };
-        let file = File::options().create(true).append(true).open(&path).map_err(fault)?;
-        file.lock().map_err(fault)?;
-        Ok(Self { _file: Some(file) })
+/// Locks `<database>.lock` until the file is dropped.
+async fn lock_beside(database: &Path) -> Result<File, StoreError> {
+    let mut path = database.as_os_str().to_owned();
+    path.push(".lock");
+    let fault = |error: std::io::Error| StoreError::Folder {
+        path: path.to_string_lossy().into_owned(),
+        why: error.to_string(),
+    };
+    let file = File::options().create(true).append(true).open(&path).map_err(fault)?;
+    let began = Instant::now();
+    loop {
+        match file.try_lock() {
+            Ok(()) => return Ok(file),
+            Err(TryLockError::Error(error)) => return Err(fault(error)),
+            Err(TryLockError::WouldBlock) if began.elapsed() > LOCK_MAX => return Err(StoreError::Locked),
+            Err(TryLockError::WouldBlock) => tokio::time::sleep(Duration::from_millis(5)).await,
+        }
     }
 }
 
 pub(super) async fn migrate(pool: &AnyPool, target: &Target) -> Result<(), StoreError> {
     let mut connection = pool.acquire().await?;
-    if target.sqlite() {
-        return run(&mut connection, target).await;
-    }
-    let locked: Option<i64> = sqlx::query(LOCK).fetch_one(&mut *connection).await?.try_get(0)?;
-    if locked != Some(1) {
-        return Err(StoreError::Locked);
-    }
-    let done = run(&mut connection, target).await;
-    sqlx::query(UNLOCK).fetch_one(&mut *connection).await?;
-    done
+    run(&mut connection, target).await
 }
 
 async fn run(connection: &mut PoolConnection<Any>, target: &Target) -> Result<(), StoreError> {

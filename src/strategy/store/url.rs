@@ -4,7 +4,10 @@ use super::error::StoreError;
 use std::path::{Path, PathBuf};
 
 /// A database as sqlx shall open it.
+#[derive(Debug)]
 pub(super) struct Target {
+    /// URL as the user gave it.
+    pub(super) given: String,
     /// URL for sqlx.
     pub(super) url: String,
     /// The file, when it is SQLite on disk.
@@ -27,11 +30,14 @@ impl Target {
             }
             let file = (path != ":memory:").then(|| PathBuf::from(path));
             let mode = if url.contains('?') { "" } else { "?mode=rwc" };
+            let given = url;
             let url = if file.is_some() { format!("{url}{mode}") } else { url.to_owned() };
-            return Ok(Self { url, file });
+            return Ok(Self { given: given.to_owned(), url, file });
         }
         match url.split_once("://") {
-            Some(("mysql" | "mariadb", rest)) if rest.contains('/') => Ok(Self { url: url.to_owned(), file: None }),
+            Some(("mysql" | "mariadb", rest)) if rest.contains('/') => {
+                Ok(Self { given: url.to_owned(), url: url.to_owned(), file: None })
+            }
             _ => Err(StoreError::Url { url: shown(url) }),
         }
     }

@@ -2,7 +2,10 @@
 
 mod cases;
 mod check;
+mod closed_loop;
 mod exact;
+mod features;
 mod inputs;
 mod oracle;
+mod raw;
 mod sweep;

@@ -1,0 +1,5 @@
+//! What a person types and what comes back: bad input refused by name and place before anything moves.
+
+mod bench;
+mod refusals;
+mod words;
