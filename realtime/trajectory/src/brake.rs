@@ -41,12 +41,7 @@ pub(crate) fn prefix(joint: &Joint, velocity_min: f64) -> Prefix {
         } else {
             return prefix;
         };
-        prefix.steps[0] = Phase {
-            duration: (limit - velocity) / braking,
-            velocity,
-            acceleration: braking,
-            slope: 0,
-        };
+        prefix.steps[0] = Phase { duration: (limit - velocity) / braking, velocity, acceleration: braking, slope: 0 };
         prefix.end = [limit, 0.0];
         return prefix;
     }
@@ -70,41 +65,23 @@ pub(crate) fn acceleration_prefix(joint: &Joint) -> Prefix {
 impl Prefix {
     /// No prefix.
     pub(crate) fn none(joint: &Joint) -> Self {
-        Prefix {
-            steps: [Phase::default(); 2],
-            end: joint.start,
-        }
+        Prefix { steps: [Phase::default(); 2], end: joint.start }
     }
 
     /// Brings the acceleration into its band.
     fn contain(&mut self, joint: &Joint) {
         let acceleration = self.end[1];
         if acceleration > joint.top {
-            self.push(
-                (acceleration - joint.top) * joint.fall,
-                joint.fall,
-                -1,
-                joint.top,
-            );
+            self.push((acceleration - joint.top) * joint.fall, joint.fall, -1, joint.top);
         } else if acceleration < -joint.bottom {
-            self.push(
-                (-joint.bottom - acceleration) * joint.rise,
-                joint.rise,
-                1,
-                -joint.bottom,
-            );
+            self.push((-joint.bottom - acceleration) * joint.rise, joint.rise, 1, -joint.bottom);
         }
     }
 
     /// Appends a step that changes the acceleration to `to`; one over the jerk is `inverse`.
     fn push(&mut self, duration: f64, inverse: f64, slope: i8, to: f64) {
         let [velocity, acceleration] = self.end;
-        let step = Phase {
-            duration,
-            velocity,
-            acceleration,
-            slope,
-        };
+        let step = Phase { duration, velocity, acceleration, slope };
         let gain = if slope == 0 {
             acceleration * duration
         } else {
@@ -124,24 +101,14 @@ impl Prefix {
     /// Brings the velocity down to the limit `joint.peak` if it is above or bound to pass it.
     /// `joint` is seen with signs turned by `sign`; says whether anything was to do.
     fn lower(&mut self, joint: &Joint, velocity_min: f64, sign: f64) -> bool {
-        let Joint {
-            peak,
-            bottom,
-            rise,
-            fall,
-            ..
-        } = *joint;
+        let Joint { peak, bottom, rise, fall, .. } = *joint;
         let (v, a) = (sign * self.end[0], sign * self.end[1]);
         let bound = if a > 0.0 { v + fall * a * a / 2.0 } else { v };
         let scale = peak.abs() + v.abs() + fall * a * a;
         if bound <= peak + TIE * scale || (a <= 0.0 && v - rise * a * a / 2.0 <= velocity_min) {
             return false;
         }
-        let at_peak = if fall > 0.0 {
-            a * a + 2.0 * (v - peak) / fall
-        } else {
-            f64::INFINITY
-        };
+        let at_peak = if fall > 0.0 { a * a + 2.0 * (v - peak) / fall } else { f64::INFINITY };
         let at_floor = (fall * a * a + 2.0 * (v - velocity_min)) / (rise + fall);
         let to = -sqrt(at_peak.min(at_floor).max(0.0)).min(bottom);
         let slope = if sign > 0.0 { -1 } else { 1 };

@@ -106,31 +106,14 @@ impl<const N: usize> Input<N> {
 
 /// The limits of one joint as the solver wants them, after a check.
 pub(crate) fn check(index: usize, input: &JointInput) -> Result<Joint, Error> {
-    let JointInput {
-        interface,
-        start,
-        target,
-        limits,
-        ..
-    } = input;
+    let JointInput { interface, start, target, limits, .. } = input;
     let interface = *interface;
     if !start.is_finite() || !target.is_finite() || !input.tolerance.is_finite() {
         return Err(Error::NotFinite { joint: index });
     }
-    let Limits {
-        velocity_min,
-        velocity_max,
-        acceleration_min,
-        acceleration_max,
-        jerk_min,
-        jerk_max,
-    } = *limits;
-    let velocities = velocity_min <= 0.0
-        && velocity_max >= 0.0
-        && velocity_min.is_finite()
-        && velocity_max.is_finite();
-    let signs =
-        acceleration_min < 0.0 && acceleration_max > 0.0 && jerk_min < 0.0 && jerk_max > 0.0;
+    let Limits { velocity_min, velocity_max, acceleration_min, acceleration_max, jerk_min, jerk_max } = *limits;
+    let velocities = velocity_min <= 0.0 && velocity_max >= 0.0 && velocity_min.is_finite() && velocity_max.is_finite();
+    let signs = acceleration_min < 0.0 && acceleration_max > 0.0 && jerk_min < 0.0 && jerk_max > 0.0;
     if !signs || (interface == Interface::Position && !velocities) {
         return Err(Error::Limits { joint: index });
     }
@@ -157,19 +140,9 @@ pub(crate) fn check(index: usize, input: &JointInput) -> Result<Joint, Error> {
     if over(a, acceleration_max) || over(-a, -acceleration_min) {
         return Err(Error::TargetAcceleration { joint: index });
     }
-    let before = if a < 0.0 {
-        v + joint.fall * a * a / 2.0
-    } else {
-        v
-    };
-    let after = if a > 0.0 {
-        v - joint.rise * a * a / 2.0
-    } else {
-        v
-    };
-    if interface == Interface::Position
-        && (over(before, velocity_max) || over(-after, -velocity_min))
-    {
+    let before = if a < 0.0 { v + joint.fall * a * a / 2.0 } else { v };
+    let after = if a > 0.0 { v - joint.rise * a * a / 2.0 } else { v };
+    if interface == Interface::Position && (over(before, velocity_max) || over(-after, -velocity_min)) {
         return Err(Error::TargetAcceleration { joint: index });
     }
     Ok(joint)

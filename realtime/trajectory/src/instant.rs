@@ -24,18 +24,12 @@ impl Instant {
         let error = (self.time - (sum - part)) + (duration - part);
         let rest = self.rest + error;
         let time = sum + rest;
-        Instant {
-            time,
-            rest: rest - (time - sum),
-        }
+        Instant { time, rest: rest - (time - sum) }
     }
 
     /// The same time with `time`, a rounding away, as its leading part.
     pub(crate) fn read_as(self, time: f64) -> Self {
-        Instant {
-            time,
-            rest: self.since(Instant::at(time)),
-        }
+        Instant { time, rest: self.since(Instant::at(time)) }
     }
 
     /// The time since `earlier`.

@@ -8,11 +8,7 @@ const STEPS_MAX: usize = 2200;
 /// Newton's step when it stays inside the bracket and the bracket keeps shrinking, else the middle.
 /// Every second step at most is wasted, so the loop ends within `STEPS_MAX`; three to eight steps
 /// are usual.
-pub(crate) fn root_between(
-    function: impl Fn(f64) -> (f64, f64),
-    mut low: f64,
-    mut high: f64,
-) -> f64 {
+pub(crate) fn root_between(function: impl Fn(f64) -> (f64, f64), mut low: f64, mut high: f64) -> f64 {
     let mut guess = low + (high - low) / 2.0;
     let mut last_step = high - low;
     for _ in 0..STEPS_MAX {
