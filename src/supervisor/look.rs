@@ -1,9 +1,13 @@
 //! What a look at a part is worth: may the recognition be acted on?
+//!
+//! A recognition that is sure by itself counts; so does one that is less sure but
+//! points at the part that was called for, since carriers are seldom misloaded.
+//! Anything else is a doubt with its reason.
 
 use super::placing::nominal_at_station;
 use nalgebra::{Isometry3, Translation3, Vector3};
 use tandem_config::{Cell, Part, isometry_of};
-use tandem_msg::{Feature, FeatureClass, Recognition};
+use tandem_msg::{FEATURE_CLASSES, Feature, FeatureClass, Recognition};
 
 /// What is known of a presented part.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,12 +95,14 @@ pub(super) fn judge(cell: &Cell, part: &Part, feature: &Feature) -> Result<Recog
     if !confidence.is_finite() || !measured.iter().all(|value| value.is_finite()) {
         return Err(Doubt::NotFinite);
     }
+    let expected = part.feature.class;
+    let certain = class == expected && certainty(confidence, cell) >= cell.perception.certainty_min;
     match feature.recognition.get() {
         Some(Recognition::Sure) => {}
+        Some(Recognition::Unsure) if certain => {}
         Some(Recognition::Unsure) => return Err(Doubt::Unsure { class, confidence }),
         Some(Recognition::NoPart) | None => return Err(Doubt::NoPart),
     }
-    let expected = part.feature.class;
     if class != expected {
         return Err(Doubt::OtherClass { class, expected });
     }
@@ -127,6 +133,16 @@ pub(super) fn judge(cell: &Cell, part: &Part, feature: &Feature) -> Result<Recog
         base_from_part: Translation3::from(shift) * nominal,
         offset,
     })
+}
+
+/// Probability that the part called for lies there, when perception gives its class the
+/// probability `seen`: Bayes' rule with the share of misloaded carriers as prior, a
+/// misloaded part being of any other class alike.
+fn certainty(seen: f64, cell: &Cell) -> f64 {
+    let misload = cell.perception.misload_probability;
+    let right = seen * (1.0 - misload);
+    let wrong = (1.0 - seen) * misload / (FEATURE_CLASSES - 1) as f64;
+    right / (right + wrong)
 }
 
 /// What a person's word makes of a part: its class is theirs, its place and size the file's.
