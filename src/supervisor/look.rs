@@ -109,13 +109,15 @@ pub(super) fn judge(cell: &Cell, part: &Part, feature: &Feature) -> Result<Recog
     let base_from_feature = isometry_of(&feature.base_from_feature).ok_or(Doubt::NotFinite)?;
     let nominal = nominal_at_station(cell, part);
     let nominal_feature = nominal * part.part_from_feature;
-    let shift = base_from_feature.translation.vector - nominal_feature.translation.vector;
+    let mut shift = base_from_feature.translation.vector - nominal_feature.translation.vector;
     let axis = |pose: &Isometry3<f64>| pose.rotation * Vector3::z();
     let tilt = axis(&base_from_feature).angle(&axis(&nominal_feature));
     let offset = shift.norm();
     if offset > cell.perception.offset_max || tilt > cell.perception.tilt_max {
         return Err(Doubt::OffPlace { offset, tilt });
     }
+    // The part lies on its carrier, whose height is known better than it is seen.
+    shift.z = 0.0;
     for (name, measured, expected) in
         [("diameter", measured[0], part.feature.diameter), ("length", measured[2], part.feature.length)]
     {
@@ -131,7 +133,7 @@ pub(super) fn judge(cell: &Cell, part: &Part, feature: &Feature) -> Result<Recog
         by_person: false,
         dimensions: measured,
         base_from_part: Translation3::from(shift) * nominal,
-        offset,
+        offset: shift.norm(),
     })
 }
 
