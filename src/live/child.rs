@@ -2,6 +2,8 @@
 
 use std::error::Error;
 use std::path::PathBuf;
+use std::sync::mpsc;
+use std::thread;
 use std::time::Duration;
 
 use tandem_bus::{Identity, Instance, Node};
@@ -59,9 +61,33 @@ pub fn role(args: &RoleArgs) -> Result<(), LiveError> {
 fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {
     let plant = Plant::new(cell, args.seed).map_err(refused(Role::Plant))?;
     let node = join(args.role, args.epoch, cell, instance)?;
-    let mut role = PlantRole::open(&node, plant)?;
-    let shell = Shell::new(cell, args.role, node.publisher(&service::stats(args.role))?)?;
-    Ok(shell.run(|now| role.cycle(now)))
+    let (mut role, camera) = PlantRole::open_apart(&node, plant)?;
+    let stats = node.publisher(&service::stats(args.role))?;
+    thread::scope(|scope| {
+        let (ready, opened) = mpsc::channel();
+        // Started before the loop is set up, whose processor and priority it must not inherit.
+        scope.spawn(move || {
+            let Some(camera) = camera else { return };
+            // Ports belong to the thread of their node, so the camera has its own.
+            let joined = join(args.role, args.epoch, cell, instance);
+            let cloud = joined.and_then(|node| Ok(camera.open(&node)?));
+            let (cloud, outcome) = match cloud {
+                Ok(cloud) => (Some(cloud), Ok(())),
+                Err(error) => (None, Err(error)),
+            };
+            // The loop waits for this word before it begins.
+            let _ = ready.send(outcome);
+            if let Some(cloud) = cloud {
+                camera.run(cloud);
+            }
+        });
+        opened.recv().unwrap_or(Ok(()))?;
+        let shell = Shell::new(cell, args.role, stats)?;
+        let left = shell.run(|now| role.cycle(now));
+        // Ends the camera.
+        drop(role);
+        Ok(left)
+    })
 }
 
 fn perception(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {

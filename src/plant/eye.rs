@@ -12,6 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use tandem_config::{Cell, FeatureGeometry, pose_of};
 use tandem_msg::PointCloud;
 
+use super::Shot;
 use super::camera::{self, Camera, View};
 use super::solid::{Clutter, Solid, Surroundings};
 
@@ -27,7 +28,7 @@ struct Subject {
 }
 
 /// The camera of the cell, with a place for every part of the product.
-pub(super) struct Eye {
+pub struct Eye {
     camera: Camera,
     distance: f64,
     subjects: Vec<Subject>,
@@ -66,9 +67,10 @@ impl Eye {
         }
     }
 
-    /// Scans a part that truly lies at `base_from_part`, for a request; nothing is
-    /// seen when there is no part. Only a new part finds new things beside it.
-    pub(super) fn scan(&mut self, part: Option<(usize, Isometry3<f64>)>, request: u32, cloud: &mut PointCloud) {
+    /// Scans the presented part where it truly lies; nothing is seen when there is
+    /// none. Only a new request finds new things beside it. Leaves the header alone.
+    pub fn scan(&mut self, shot: &Shot, cloud: &mut PointCloud) {
+        let &Shot { part, request } = shot;
         cloud.point_count = 0;
         cloud.request = 0;
         let Some((part, base_from_part)) = part else { return };

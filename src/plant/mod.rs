@@ -49,7 +49,7 @@ mod tests;
 use arm::{Arm, GRAVITY};
 use drive::Drive;
 use effector::{Effector, Reach};
-use eye::Eye;
+pub use eye::Eye;
 use human::{Person, Sight, Tracker};
 use model::PlantModel;
 use parts::Parts;
@@ -82,6 +82,15 @@ pub struct PlantOutputs {
     pub scan_due: bool,
 }
 
+/// What the camera has to know for one picture. The truth; for [`Eye::scan`] only.
+#[derive(Clone, Copy, Debug)]
+pub struct Shot {
+    /// The presented part and where it truly lies.
+    part: Option<(usize, Isometry3<f64>)>,
+    /// The request that presented it.
+    request: u32,
+}
+
 /// The simulated hardware of one cell.
 pub struct Plant {
     world: PhysicsWorld,
@@ -92,7 +101,8 @@ pub struct Plant {
     feeder: Feeder,
     person: Person,
     tracker: Tracker,
-    eye: Eye,
+    /// In the plant until it is taken out.
+    eye: Option<Eye>,
     referee: Referee,
     noise: ChaCha8Rng,
     luck: ChaCha8Rng,
@@ -155,7 +165,7 @@ impl Plant {
             feeder: Feeder::new(model.feeder),
             person: Person::new(model.person, stream(seed, 1)),
             tracker: Tracker::new(model.tracking_sigma, stream(seed, 2)),
-            eye,
+            eye: Some(eye),
             noise: stream(seed, 3),
             luck: stream(seed, 4),
             joint_noise: model.joint_noise,
@@ -207,8 +217,23 @@ impl Plant {
 
     /// The picture that was due: the presented part as the camera sees it. Leaves the header alone.
     pub fn scan(&mut self, cloud: &mut PointCloud) {
+        let shot = self.shot();
+        if let Some(eye) = &mut self.eye {
+            eye.scan(&shot, cloud);
+        }
+    }
+
+    /// What the camera has to know for the picture that is due.
+    pub fn shot(&self) -> Shot {
         let part = self.feeder.presented().map(|part| (part, self.parts.base_from_part(part)));
-        self.eye.scan(part, self.feeder.scan_request(), cloud);
+        Shot { part, request: self.feeder.scan_request() }
+    }
+
+    /// Takes the camera out of the plant. A picture takes it several cycles of the
+    /// plant; on a thread of its own it holds none of them up, as a real one would not.
+    /// From then on [`Plant::scan`] does nothing.
+    pub fn take_camera(&mut self) -> Option<Eye> {
+        self.eye.take()
     }
 
     fn move_arm(&mut self, now: Stamp, dt: f64, command: &JointCommand, outputs: &mut PlantOutputs) {

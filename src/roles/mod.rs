@@ -14,6 +14,6 @@ mod supervisor;
 
 pub use controller::ControllerRole;
 pub use perception::PerceptionRole;
-pub use plant::PlantRole;
+pub use plant::{CameraRole, PlantRole};
 pub use ports::{MemoryPorts, Ports};
 pub use supervisor::{SupervisorRole, Surroundings};

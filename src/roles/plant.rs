@@ -1,12 +1,14 @@
 //! The plant and its ports.
 
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
 use tandem_bus::{Read, Write};
 use tandem_msg::{
     CellRequest, CellState, HumanState, JointCommand, JointState, OperatorEvent, PointCloud, Prompt, Stamp,
 };
 
 use super::{Ports, service};
-use crate::plant::{Plant, PlantInputs, PlantOutputs};
+use crate::plant::{Eye, Plant, PlantInputs, PlantOutputs, Shot};
 
 /// The plant with its ports.
 pub struct PlantRole<P: Ports> {
@@ -19,8 +21,41 @@ pub struct PlantRole<P: Ports> {
     human: P::Writer<HumanState>,
     cell: P::Writer<CellState>,
     operator: P::Writer<OperatorEvent>,
-    cloud: P::Writer<PointCloud>,
+    camera: Camera<P>,
     unsent: u64,
+}
+
+/// Where pictures are taken.
+enum Camera<P: Ports> {
+    /// In the plant's cycle.
+    Within(P::Writer<PointCloud>),
+    /// By a [`CameraRole`] on another thread.
+    Apart(SyncSender<(Stamp, Shot)>),
+}
+
+/// The plant's camera, to be run on a thread of its own.
+pub struct CameraRole {
+    eye: Eye,
+    shots: Receiver<(Stamp, Shot)>,
+}
+
+impl CameraRole {
+    /// Opens the camera's port.
+    ///
+    /// # Errors
+    /// What the bus says.
+    pub fn open<P: Ports>(&self, ports: &P) -> Result<P::Writer<PointCloud>, P::Error> {
+        ports.writer(service::CLOUD)
+    }
+
+    /// Takes the pictures the plant asks for, until the plant is dropped.
+    pub fn run(mut self, mut cloud: impl Write<PointCloud>) {
+        for (stamp, shot) in self.shots {
+            // Straight into the loaned sample: a cloud is never copied. One that is lost is missed by the
+            // supervisor, which has the part scanned again.
+            let _ = cloud.publish_with(stamp, |cloud| self.eye.scan(&shot, cloud));
+        }
+    }
 }
 
 impl<P: Ports> PlantRole<P> {
@@ -29,7 +64,25 @@ impl<P: Ports> PlantRole<P> {
     /// # Errors
     /// What the bus says.
     pub fn open(ports: &P, plant: Plant) -> Result<Self, P::Error> {
+        let camera = Camera::Within(ports.writer(service::CLOUD)?);
+        Self::with_camera(ports, plant, camera)
+    }
+
+    /// Opens the plant's ports but the camera's, which is handed back to be run on
+    /// another thread; `None` when the plant has no camera any more.
+    ///
+    /// # Errors
+    /// What the bus says.
+    pub fn open_apart(ports: &P, mut plant: Plant) -> Result<(Self, Option<CameraRole>), P::Error> {
+        // One picture may wait while one is taken.
+        let (sender, shots) = sync_channel(1);
+        let camera = plant.take_camera().map(|eye| CameraRole { eye, shots });
+        Ok((Self::with_camera(ports, plant, Camera::Apart(sender))?, camera))
+    }
+
+    fn with_camera(ports: &P, plant: Plant, camera: Camera<P>) -> Result<Self, P::Error> {
         Ok(Self {
+            camera,
             plant,
             outputs: PlantOutputs::default(),
             command: ports.reader(service::ARM_COMMAND)?,
@@ -39,7 +92,6 @@ impl<P: Ports> PlantRole<P> {
             human: ports.writer(service::HUMAN)?,
             cell: ports.writer(service::CELL)?,
             operator: ports.writer(service::OPERATOR)?,
-            cloud: ports.writer(service::CLOUD)?,
             unsent: 0,
         })
     }
@@ -55,8 +107,11 @@ impl<P: Ports> PlantRole<P> {
             + u64::from(self.cell.publish(now, &out.cell).is_err())
             + u64::from(self.operator.publish(now, &out.operator).is_err());
         if out.scan_due {
-            // The camera writes straight into the loaned sample: a cloud is never copied.
-            unsent += u64::from(self.cloud.publish_with(now, |cloud| self.plant.scan(cloud)).is_err());
+            unsent += u64::from(match &mut self.camera {
+                // The camera writes straight into the loaned sample: a cloud is never copied.
+                Camera::Within(cloud) => cloud.publish_with(now, |cloud| self.plant.scan(cloud)).is_err(),
+                Camera::Apart(shots) => shots.try_send((now, self.plant.shot())).is_err(),
+            });
         }
         self.unsent += unsent;
     }

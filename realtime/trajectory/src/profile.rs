@@ -256,6 +256,21 @@ impl Profile {
         self.minimum
     }
 
+    /// The state at `time`, searched from segment `segment` on, which is moved to the one found.
+    #[inline]
+    pub(crate) fn at_from(&self, time: f64, segment: &mut u8) -> State {
+        let time = time.max(0.0);
+        let mut index = usize::from(*segment).min(SEGMENTS_MAX - 1);
+        if self.times[index] > time {
+            index = 0;
+        }
+        while index + 1 < SEGMENTS_MAX && self.times[index + 1] <= time {
+            index += 1;
+        }
+        *segment = index as u8;
+        self.state(index).advanced(time - self.times[index], self.jerk(Slopes::of(self.codes, index)))
+    }
+
     /// The state at `time`; before the start, the start.
     #[must_use]
     #[inline]

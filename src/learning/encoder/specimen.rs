@@ -123,7 +123,7 @@ fn feature(class: FeatureClass, rng: &mut ChaCha8Rng) -> (FeatureGeometry, Form)
     match class {
         FeatureClass::ThreadedHole | FeatureClass::SmoothHole => {
             g.diameter = size;
-            g.depth = of(rng, 0.25, 2.2);
+            g.depth = size * log_uniform([0.22, 2.2], rng);
             g.chamfer = of(rng, -0.08, 0.12).max(0.0);
             if class == FeatureClass::ThreadedHole {
                 g.pitch = of(rng, 0.09, 0.19);

@@ -26,7 +26,7 @@ use super::sample::Sample;
 use plane::Plane;
 
 /// Dense points that take part in a fit, at most.
-const DENSE: usize = 5_000;
+const DENSE: usize = 10_000;
 /// Feature points below which nothing is fitted.
 const SEGMENT_MIN: usize = 8;
 
@@ -37,6 +37,8 @@ pub struct Fit {
     pub camera_from_feature: Isometry3<f64>,
     /// Dimensions; zero where they do not apply or could not be told.
     pub dimensions: FeatureDimensions,
+    /// Of a hole or axis: the share of its wall's variance that a helix explains, 0 to 1.
+    pub winding: Option<f64>,
 }
 
 /// A dense point in the frame of the surface: x, y in it, z above it.
@@ -91,11 +93,19 @@ pub fn fit(cloud: &[[f32; 3]], sample: &Sample, segment: &[bool], class: Feature
     if class == FeatureClass::Other || dense.feature.len() < SEGMENT_MIN {
         return surface.map(|plane| bare(&plane, &dense));
     }
-    match class {
+    let fit = match class {
         FeatureClass::Slot => slot::fit(&surface?, &dense),
         FeatureClass::Buckle => hook::fit(&surface?, &dense),
-        _ => round::fit(surface.as_ref(), sample, segment, &dense, class, &mut rng),
-    }
+        _ => round::fit(surface.as_ref(), cloud, sample, segment, &dense, class, &mut rng),
+    };
+    fit.filter(|fit| near(fit, &dense.feature))
+}
+
+/// Whether the origin lies where the feature's points are: a fit that ran away is none.
+fn near(fit: &Fit, feature: &[Vector3<f64>]) -> bool {
+    let middle = feature.iter().sum::<Vector3<f64>>() / feature.len() as f64;
+    let mut reach: Vec<f64> = feature.iter().map(|p| (p - middle).norm()).collect();
+    (fit.camera_from_feature.translation.vector - middle).norm() < 2.0 * quantile(&mut reach, 0.9)
 }
 
 /// Where there is no feature to locate: the point of the surface the camera looks at, or the
@@ -113,6 +123,7 @@ fn bare(plane: &Plane, dense: &Dense) -> Fit {
     Fit {
         camera_from_feature: frame.pose(Vector3::zeros(), Vector3::z(), Vector3::x()),
         dimensions: FeatureDimensions::default(),
+        winding: None,
     }
 }
 

@@ -28,8 +28,6 @@ struct Wall {
     slope: f64,
     /// Standard deviations of centre, radius.
     sigma: [f64; 2],
-    /// Median distance of all flank points.
-    median: f64,
 }
 
 impl Wall {
@@ -43,6 +41,7 @@ impl Wall {
 /// Fits a hole, axis or cone.
 pub(crate) fn fit(
     surface: Option<&Plane>,
+    cloud: &[[f32; 3]],
     sample: &Sample,
     segment: &[bool],
     dense: &Dense,
@@ -61,13 +60,34 @@ pub(crate) fn fit(
         let frame = Frame::on(middle, axis);
         Some((frame, wall(&frame, dense, class, LEAN[1], rng)?))
     });
+    let agreement = |f: &Frame, w: &Wall| agreement(f, w, cloud, sample, segment);
     let (frame, wall, on_surface) = match (by_surface, by_normals) {
-        (Some((f, w)), Some((_, free))) if w.median <= 1.3 * free.median + 20e-6 => (f, w, true),
+        (Some((f, w)), Some((free, v))) if agreement(&f, &w) >= 0.85 * agreement(&free, &v) => (f, w, true),
         (_, Some((f, w))) => (f, w, false),
         (Some((f, w)), None) => (f, w, true),
         (None, None) => return None,
     };
     Some(finish(&frame, &wall, on_surface, dense, class, sample))
+}
+
+/// Share of the feature's sampled points near the wall whose normals are the wall's.
+fn agreement(frame: &Frame, wall: &Wall, cloud: &[[f32; 3]], sample: &Sample, segment: &[bool]) -> f64 {
+    let (mut alike, mut count) = (0.0, 0.0);
+    for (i, _) in segment.iter().enumerate().filter(|(_, s)| **s) {
+        count += 1.0;
+        let p = frame.local(wide(cloud[usize::from(sample.source[i])]));
+        let (off, e) = wall.distance(&p);
+        if e.abs() > 0.15 * wall.radius.abs() {
+            continue;
+        }
+        let out = off / off.norm().max(1e-9);
+        let lean = -wall.slope - wall.lean.dot(&out);
+        let normal = frame.axes.tr_mul(&wide(sample.normal_in_camera(i)));
+        // Of a bore the wall is seen from within.
+        let cosine = Vector3::new(out.x, out.y, lean).normalize().dot(&normal).abs();
+        alike += f64::from(u8::from(cosine > 0.8));
+    }
+    alike / f64::max(count, 1.0)
 }
 
 /// The axis that most normals of the feature keep a common angle to.
@@ -139,7 +159,7 @@ fn guess(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<Wall> {
         if radius > 1.2 * widest || radius < 0.05 * widest {
             continue;
         }
-        let mut wall = Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2], median: f64::MAX };
+        let mut wall = Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2] };
         if cone {
             let height = (a.z + b.z + c.z) / 3.0;
             let other = voters[rng.random_range(0..count)];
@@ -218,8 +238,7 @@ fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall
         wall.radius += step[4];
         wall.slope += step[5];
         wall.sigma = [inverse[(0, 0)].max(inverse[(1, 1)]), inverse[(4, 4)]].map(|v| rms * v.max(0.0).sqrt());
-        wall.median = quantile(&mut off_wall, 0.5);
-        reach = (6.0 * wall.median).clamp(0.02 * start, reach);
+        reach = (6.0 * quantile(&mut off_wall, 0.5)).clamp(0.02 * start, reach);
     }
     let sane =
         wall.radius > 0.1 * start && wall.radius < 6.0 * start && wall.lean.norm() < 1.0 && wall.slope.abs() < 2.0;
@@ -238,16 +257,17 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
     let spacing = 2.0 * f64::from(sample.scale) / 100.0;
     let depth = measured((end - base).abs(), 0.3 * spacing + 0.01 * (end - base).abs());
 
+    let wound: Vec<[f64; 3]> = local
+        .iter()
+        .filter_map(|p| {
+            let (off, e) = wall.distance(p);
+            (e.abs() < 0.2 * wall.radius).then(|| [p.z, off.y.atan2(off.x), e])
+        })
+        .collect();
+    let winding = if class == FeatureClass::Cone { None } else { thread::pitch(&wound, wall.radius) };
     let (diameter, pitch) = match class {
         FeatureClass::ThreadedHole | FeatureClass::ThreadedAxis => {
-            let wound: Vec<[f64; 3]> = local
-                .iter()
-                .filter_map(|p| {
-                    let (off, e) = wall.distance(p);
-                    (e.abs() < 0.2 * wall.radius).then(|| [p.z, off.y.atan2(off.x), e])
-                })
-                .collect();
-            let pitch = thread::pitch(&wound, wall.radius);
+            let pitch = winding.map(|(pitch, _)| pitch).unwrap_or_default();
             // Crests hide much of the roots, so that the wall fitted lies nearer to them: in a
             // bore the major diameter is most of twice the profile's height outside, on an axis
             // a little of it. Shares measured on generated threads.
@@ -267,6 +287,7 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
     Fit {
         camera_from_feature: frame.pose(at, axis, Vector3::x()),
         dimensions: FeatureDimensions { diameter, depth, pitch, ..FeatureDimensions::default() },
+        winding: winding.map(|(_, share)| share),
     }
 }
 

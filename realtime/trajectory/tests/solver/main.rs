@@ -4,6 +4,7 @@ mod cases;
 mod check;
 mod closed_loop;
 mod exact;
+mod features;
 mod inputs;
 mod oracle;
 mod raw;
