@@ -92,7 +92,7 @@ impl Profile {
                         let state = segment.start.advanced(time, segment.jerk);
                         (sign * (state.position - position), sign * state.velocity)
                     };
-                    let time = if high == 0.0 { to } else { root_between(value, from, to) };
+                    let time = if high == 0.0 { to } else { root_between(value, from, to, from + (to - from) / 2.0) };
                     return Some(segment.start_time + time);
                 }
             }

@@ -33,9 +33,11 @@
 //! dP/dT = w - beta x y / 2     before the cruise,      dP/dT = V     with it
 //! ```
 //!
-//! whose zeros are roots of quadratics in each case. They, the changes of case and the start of
-//! the cruise cut the curve P(T) into at most 16 pieces, on each of which it is monotone and
-//! given by one formula.
+//! Once the fall reaches from a positive `x` to a negative `y`, this only grows, up to the cruise: the
+//! curve P(T) is convex, and a distance not yet covered is first covered at one place, found by
+//! Newton's iteration. Before that, where both have the same sign, the zeros of the slope, which are
+//! roots of quadratics in each case, and the changes of case cut the curve into at most 16 pieces, on
+//! each of which it is monotone and given by one formula.
 
 use crate::{root::root_between, sqrt::sqrt};
 
@@ -280,36 +282,65 @@ impl Extremal {
     /// The first duration in `[from, to]` at which `distance` is covered, when less is covered at
     /// `from`.
     pub(crate) fn first_covering(&self, distance: f64, tie: Tie, from: f64, to: f64) -> Option<f64> {
-        let mut marks = Marks::between(from, to.min(self.peak_time));
-        if from < self.peak_time {
+        let exact = |time: f64| {
+            let shape = self.shape(time);
+            let off = self.distance(&shape) - distance;
+            let known = off.abs() <= self.tolerance(time, &shape) / 16.0;
+            (if known { 0.0 } else { off }, self.slope(&shape))
+        };
+        let (mut begin, mut before) = (from, self.distance_in(from));
+        let convex = self.convex_from();
+        if from < convex {
+            let end = to.min(convex);
+            let mut marks = Marks::between(from, end);
             self.mark_pieces(&mut marks);
-            marks.push(to.min(self.peak_time));
+            marks.push(end);
+            for &mark in marks.sorted() {
+                let covered = self.distance_in(mark);
+                if covered >= distance - tie.tight {
+                    let middle = begin + (mark - begin) / 2.0;
+                    return Some(if covered <= distance { mark } else { root_between(exact, begin, mark, middle) });
+                }
+                if covered < before && before >= distance - tie.loose {
+                    return Some(begin);
+                }
+                (begin, before) = (mark, covered);
+            }
         }
-        let (mut piece_start, mut before) = (from, self.distance_in(from));
-        for &mark in marks.sorted() {
-            let covered = self.distance_in(mark);
+        let end = to.min(self.peak_time);
+        if begin < end {
+            if before >= distance - tie.loose && self.slope(&self.shape(begin)) < 0.0 {
+                return Some(begin);
+            }
+            let covered = self.distance_in(end);
+            if covered > distance {
+                // About the second power of the time is covered.
+                let share = sqrt(((distance - before) / (covered - before)).clamp(0.0, 1.0));
+                return Some(root_between(exact, begin, end, begin + (end - begin) * share));
+            }
             if covered >= distance - tie.tight {
-                let exact = |time: f64| {
-                    let shape = self.shape(time);
-                    let off = self.distance(&shape) - distance;
-                    let known = off.abs() <= self.tolerance(time, &shape) / 16.0;
-                    (if known { 0.0 } else { off }, self.slope(&shape))
-                };
-                return Some(if covered <= distance { mark } else { root_between(exact, piece_start, mark) });
+                return Some(end);
             }
-            if covered < before && before >= distance - tie.loose {
-                return Some(piece_start);
+            if covered > before {
+                (begin, before) = (end, covered);
             }
-            (piece_start, before) = (mark, covered);
         }
         if to > self.peak_time && self.joint.peak > 0.0 {
-            let begin = from.max(self.peak_time);
-            let time = begin + (distance - self.distance_in(begin)).max(0.0) / self.joint.peak;
+            let cruise = from.max(self.peak_time);
+            let time = cruise + (distance - self.distance_in(cruise)).max(0.0) / self.joint.peak;
             if time <= to {
                 return Some(time);
             }
         }
-        (before >= distance - tie.loose).then_some(piece_start)
+        (before >= distance - tie.loose).then_some(begin)
+    }
+
+    /// The duration from which on P(T) is convex until the cruise begins: that at which the fall first
+    /// reaches from positive to negative accelerations. From there on `w` and `-x y` only grow.
+    fn convex_from(&self) -> f64 {
+        let (limit, c) = if self.c >= 0.0 { (self.joint.top, self.c) } else { (self.joint.bottom, -self.c) };
+        let s = if c <= limit * limit { sqrt(c) } else { (limit * limit + c) / (2.0 * limit) };
+        self.offset + 2.0 * self.mean * s
     }
 
     /// Marks every duration at which the formula or the sign of the slope of P changes.

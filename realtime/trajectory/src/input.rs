@@ -53,6 +53,14 @@ pub struct Input<const N: usize> {
     /// How far from its target position a joint may end where more exactness would cost time, as when
     /// the start is measured with noise. 0 asks for the target to within rounding.
     pub tolerance: [f64; N],
+    /// Lowest and highest position each joint may take on the way. There is no way round them: a motion
+    /// that would pass one is [`Error::PositionLimit`]. Infinite for none.
+    pub position_min: [f64; N],
+    /// See `position_min`.
+    pub position_max: [f64; N],
+    /// Return to a velocity limit that the start exceeds without dipping below it: slower than the
+    /// fastest return, and what one wants after lowering a limit in motion.
+    pub soft_limits: [bool; N],
     /// The shortest duration wanted, in seconds; 0 for none.
     pub minimum_duration: f64,
     /// If above 0, durations are whole multiples of it, in seconds.
@@ -73,6 +81,9 @@ impl<const N: usize> Default for Input<N> {
             target: [State::default(); N],
             limits: [Limits::default(); N],
             tolerance: [0.0; N],
+            position_min: [f64::NEG_INFINITY; N],
+            position_max: [f64::INFINITY; N],
+            soft_limits: [false; N],
             minimum_duration: 0.0,
             duration_step: 0.0,
             enabled: [true; N],
@@ -90,6 +101,7 @@ pub(crate) struct JointInput {
     pub(crate) target: State,
     pub(crate) limits: Limits,
     pub(crate) tolerance: f64,
+    pub(crate) soft: bool,
 }
 
 impl<const N: usize> Input<N> {
@@ -100,6 +112,7 @@ impl<const N: usize> Input<N> {
             target: self.target[index],
             limits: self.limits[index],
             tolerance: self.tolerance[index].max(0.0),
+            soft: self.soft_limits[index],
         }
     }
 }

@@ -1,6 +1,7 @@
 //! The motion of one joint as it is stored and evaluated: constant-jerk segments.
 
 use crate::{
+    brake::STEPS_MAX,
     extremal::Phase,
     instant::Instant,
     state::{Limits, State},
@@ -9,7 +10,8 @@ use crate::{
 /// Room for a prefix, a mixture of two extremal motions of 7 phases, and the end state.
 ///
 /// Two motions of 7 phases have 12 switching times, hence 13 segments. A prefix of one step adds one.
-/// A prefix of two ends waiting at an acceleration limit, so one of the motions lacks its first phase.
+/// A prefix of two ends waiting at an acceleration limit, so one of the motions lacks its first phase;
+/// one of three ends at the velocity limit, where one of the motions begins with its cruise.
 pub(crate) const SEGMENTS_MAX: usize = 15;
 
 /// One constant-jerk segment of a joint's motion.
@@ -94,7 +96,7 @@ impl Profile {
     }
 
     /// Appends the steps of a prefix; returns its duration and the position it ends at.
-    pub(crate) fn prefix(&mut self, steps: &[Phase; 2], position: f64) -> (f64, f64) {
+    pub(crate) fn prefix(&mut self, steps: &[Phase; STEPS_MAX], position: f64) -> (f64, f64) {
         let (mut now, mut position) = (Instant::default(), position);
         for step in steps {
             if step.duration > 0.0 {
@@ -200,11 +202,7 @@ impl Profile {
     }
 
     fn jerk_of(&self, slope: i8) -> f64 {
-        match slope {
-            1 => self.jerk_rise,
-            -1 => self.jerk_fall,
-            _ => 0.0,
-        }
+        [self.jerk_fall, 0.0, self.jerk_rise, 0.0][(slope + 1) as usize & 3]
     }
 
     fn jerk(&self, slopes: Slopes) -> f64 {
@@ -325,7 +323,6 @@ impl<'a> Walk<'a> {
     /// acceleration, where it does least harm: the phases before it are timed from the beginning, those
     /// after it from the end. Without such a phase the motion ends a rounding early or late.
     fn new(phases: &'a [Phase; 7], sign: i8, begin: f64, time: f64) -> Self {
-        let mut starts = [Instant::at(begin); 8];
         let (mut pivot, mut longest, mut last) = (7, 0.0, 0);
         for (index, phase) in phases.iter().enumerate() {
             if phase.slope == 0 && phase.duration > longest {
@@ -334,7 +331,10 @@ impl<'a> Walk<'a> {
             if phase.duration > 0.0 {
                 last = index;
             }
-            starts[index + 1] = starts[index].after(phase.duration.max(0.0));
+        }
+        let mut starts = [Instant::at(begin); 8];
+        for index in 0..pivot {
+            starts[index + 1] = starts[index].after(phases[index].duration.max(0.0));
         }
         if pivot < 7 {
             starts[7] = Instant::at(begin + time);

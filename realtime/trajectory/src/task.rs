@@ -47,13 +47,13 @@ enum Goal {
 impl Task {
     pub(crate) fn new(index: usize, input: &JointInput) -> Result<Self, Error> {
         let joint = input::check(index, input)?;
-        let JointInput { interface, start, target, limits, tolerance } = input;
+        let JointInput { interface, start, target, limits, tolerance, .. } = input;
         let rounding = POSITION_TIE * (start.position.abs() + target.position.abs());
         let reach = |joint: Joint, position: f64| {
             Reach::new(joint, limits.velocity_min, target.position - position, rounding, *tolerance)
         };
         let brake = match interface {
-            Interface::Position => brake::prefix(&joint, limits.velocity_min),
+            Interface::Position => brake::prefix(&joint, limits.velocity_min, input.soft),
             Interface::Velocity => brake::acceleration_prefix(&joint),
         };
         let mut direct = None;

@@ -39,7 +39,17 @@ impl<const N: usize> Trajectory<N> {
     /// # Realtime
     /// No allocation; at most `2 + 3 N` passes over the joints, each of bounded work.
     pub fn calculate(input: &Input<N>) -> Result<Self, Error> {
-        Plan::new(input)?.trajectory(input)
+        let trajectory = Plan::new(input)?.trajectory(input)?;
+        for (index, profile) in trajectory.profiles.iter().enumerate() {
+            let (low, high) = (input.position_min[index], input.position_max[index]);
+            if input.enabled[index] && (low > f64::NEG_INFINITY || high < f64::INFINITY) {
+                let extrema = profile.extrema();
+                if extrema.lowest.position < low || extrema.highest.position > high {
+                    return Err(Error::PositionLimit { joint: index });
+                }
+            }
+        }
+        Ok(trajectory)
     }
 
     /// The fastest stop of each joint, whatever the others do. Velocity limits play no part: braking
@@ -208,6 +218,9 @@ fn own_duration<const N: usize>(task: &Task, input: &Input<N>, index: usize) -> 
 /// as it is; `next` moves a duration to the first one some joint can take.
 fn possible(time: f64, step: f64, passes: usize, next: impl Fn(f64) -> Result<f64, Error>) -> Result<f64, Error> {
     let mut duration = next(time)?;
+    if step <= 0.0 && duration <= time {
+        return Ok(time);
+    }
     for _ in 0..passes {
         let candidate = if step > 0.0 { multiple(duration, step) } else { duration };
         let found = next(candidate)?;

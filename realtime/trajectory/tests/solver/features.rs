@@ -1,6 +1,9 @@
 //! What is built on a trajectory: stops, extremes, cursors, loops.
 
-use crate::inputs::{Kind, Problem, Source};
+use crate::{
+    check::check,
+    inputs::{Kind, Problem, Source},
+};
 use tandem_trajectory::{Cursor, Error, Generator, Input, Limits, State, Stopping, Synchronization, Trajectory};
 
 fn input<const N: usize>(source: &mut Source) -> Input<N> {
@@ -167,4 +170,85 @@ fn errors_name_joint_and_reason() {
     assert_eq!(change(&|input| input.limits[1].velocity_max = 0.0), Err(Error::Unreachable { joint: 1 }));
     let shown = std::format!("{}", Error::Limits { joint: 3 });
     assert!(shown.starts_with("joint 3: a limit is NaN"), "{shown}");
+}
+
+/// After a limit has been lowered in motion, a soft return comes down to it and stays; the fastest
+/// one dips below it.
+#[test]
+fn a_soft_return_never_dips_below_the_lowered_limit() {
+    let mut source = Source::new(Kind::Benchmark, 16);
+    let mut softened = 0;
+    for _ in 0..3000 {
+        let mut input = input::<1>(&mut source);
+        let limits = &mut input.limits[0];
+        // In motion at the old limit, and the limit is halved.
+        let ahead = input.target[0].position > input.start[0].position;
+        let speed = limits.velocity_max * if ahead { 1.0 } else { -1.0 };
+        input.start[0] = State { velocity: speed, acceleration: 0.0, ..input.start[0] };
+        let far = 10.0 + 4.0 * speed.abs() / limits.acceleration_max + 4.0 * limits.acceleration_max / limits.jerk_max;
+        input.target[0] = State::at_rest(input.target[0].position + far * speed);
+        *limits = Limits::symmetric(limits.velocity_max / 2.0, limits.acceleration_max, limits.jerk_max);
+        let fast = Trajectory::calculate(&input).expect("valid");
+        input.soft_limits[0] = true;
+        let soft = Trajectory::calculate(&input).expect("valid");
+        let faults = check(&soft.profiles()[0], &input.start[0], &input.target[0], true, &input.limits[0]);
+        assert!(
+            faults.position < 1e-11 * input.target[0].position.abs().max(100.0)
+                && faults.velocity < 1e-10
+                && faults.excess < 1e-10,
+            "{faults:?} {input:?}"
+        );
+        let limit = input.limits[0].velocity_max;
+        let mut below = false;
+        let mut last = f64::INFINITY;
+        // Until the joint brakes for the target, its speed falls to the limit and stays there.
+        for step in 0..400 {
+            let time = soft.duration() * f64::from(step) / 400.0;
+            let [State { velocity, .. }] = soft.at(time);
+            let braking = soft.duration() - time
+                < limit / input.limits[0].acceleration_max
+                    + input.limits[0].acceleration_max / input.limits[0].jerk_max
+                    + 1e-9
+                || soft.duration() - time < 2.0 * (limit / input.limits[0].jerk_max).sqrt() + 1e-9;
+            if !braking {
+                assert!(velocity.abs() >= limit * (1.0 - 1e-9), "{velocity} at {time} {input:?}");
+                assert!(velocity.abs() <= last * (1.0 + 1e-12));
+                last = velocity.abs();
+            }
+            let [State { velocity, .. }] = fast.at(fast.duration() * f64::from(step) / 800.0);
+            below |= velocity.abs() < limit * 0.999;
+        }
+        softened += u32::from(below);
+    }
+    assert!(softened > 1500, "the fastest return dips: {softened}");
+}
+
+/// A position limit is kept or refused, never passed.
+#[test]
+fn a_position_limit_is_never_passed() {
+    let mut source = Source::new(Kind::Benchmark, 17);
+    let (mut kept, mut refused) = (0, 0);
+    for _ in 0..3000 {
+        let mut input = input::<1>(&mut source);
+        let (start, target) = (input.start[0].position, input.target[0].position);
+        input.position_min[0] = start.min(target) - 0.2;
+        input.position_max[0] = start.max(target) + 0.2;
+        match Trajectory::calculate(&input) {
+            Ok(trajectory) => {
+                kept += 1;
+                for step in 0..=100 {
+                    let [State { position, .. }] = trajectory.at(trajectory.duration() * f64::from(step) / 100.0);
+                    assert!(
+                        position >= input.position_min[0] - 1e-12 && position <= input.position_max[0] + 1e-12,
+                        "{input:?}"
+                    );
+                }
+            }
+            Err(error) => {
+                refused += 1;
+                assert_eq!(error, Error::PositionLimit { joint: 0 });
+            }
+        }
+    }
+    assert!(kept > 500 && refused > 500, "{kept} kept, {refused} refused");
 }

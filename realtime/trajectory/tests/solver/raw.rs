@@ -21,7 +21,7 @@ fn number(source: &mut Source) -> f64 {
 fn any_bit_pattern_gives_an_error_or_a_finite_trajectory() {
     let mut source = Source::new(Kind::Benchmark, 7);
     let (mut solved, mut refused) = (0, 0);
-    for index in 0..200_000 {
+    for index in 0..100_000 {
         let mut input = Input::<2>::default();
         for joint in 0..2 {
             let mut state = || State {

@@ -8,7 +8,7 @@ use tandem_trajectory::{Input, Limits, State, Synchronization, Trajectory};
 
 /// Problems of each kind; the environment can ask for more.
 fn count() -> usize {
-    std::env::var("TANDEM_SWEEP").ok().and_then(|count| count.parse().ok()).unwrap_or(10_000)
+    std::env::var("TANDEM_SWEEP").ok().and_then(|count| count.parse().ok()).unwrap_or(4_000)
 }
 
 fn input<const N: usize>(kind: Kind, problems: &[Problem; N]) -> Input<N> {
