@@ -55,6 +55,9 @@ pub(crate) fn best(values: &[f32; FEATURE_CLASSES]) -> usize {
     (0..FEATURE_CLASSES).max_by(|&a, &b| values[a].total_cmp(&values[b]).then(b.cmp(&a))).unwrap_or(0)
 }
 
+/// Share of sure answers that may be wrong.
+const WRONG_MAX: f64 = 0.025;
+
 /// What calibration decides.
 pub(crate) struct Calibration {
     pub(crate) temperature: f64,
@@ -64,7 +67,7 @@ pub(crate) struct Calibration {
 
 /// Calibrates on the validation split: the temperature and the weight of the winding with the
 /// least negative log-likelihood, then the smallest probability above which at most one
-/// answer in a hundred is wrong.
+/// answer in forty is wrong.
 pub(crate) fn calibrate(network: &Network, seed: u64, count: usize) -> Result<Calibration, TrainError> {
     let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
     let mut cases = Vec::with_capacity(count);
@@ -118,7 +121,7 @@ fn threshold(cases: &[([f32; FEATURE_CLASSES], usize)], temperature: f64) -> f64
         .find(|limit| {
             let sure = scored.iter().filter(|(p, _)| p >= limit);
             let (count, wrong) = sure.fold((0, 0), |(n, w), (_, right)| (n + 1, w + u32::from(!right)));
-            f64::from(wrong) <= 0.01 * f64::from(count)
+            f64::from(wrong) <= WRONG_MAX * f64::from(count)
         })
         .unwrap_or(0.99)
 }
