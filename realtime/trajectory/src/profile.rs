@@ -123,12 +123,15 @@ impl Profile {
         position: f64,
     ) -> (Instant, f64) {
         self.share = share;
-        let mut motions = [Walk::new(far, 1, begin, time), Walk::new(near, -1, begin, time)];
-        if share >= 1.0 {
-            motions[1] = motions[0];
+        let far = |sign| Walk::new(far, sign, begin, time);
+        let near = |sign| Walk::new(near, sign, begin, time);
+        let mut motions = if share >= 1.0 {
+            [far(1); 2]
         } else if share <= 0.0 {
-            motions[0] = motions[1];
-        }
+            [near(-1); 2]
+        } else {
+            [far(1), near(-1)]
+        };
         let (mut now, mut position) = (Instant::at(begin), position);
         // Each pass ends a phase of one of the motions: 14 at most.
         for _ in 0..14 {
@@ -205,6 +208,15 @@ impl Profile {
         [self.jerk_fall, 0.0, self.jerk_rise, 0.0][(slope + 1) as usize & 3]
     }
 
+    /// The jerk of segment `index`.
+    #[inline]
+    fn jerk_at(&self, index: usize) -> f64 {
+        let jerks = [0.0, self.jerk_rise, self.jerk_fall, 0.0];
+        let code = (self.codes >> (4 * index)) as usize;
+        let (far, near) = (jerks[code & 3], jerks[code >> 2 & 3]);
+        if far == near { far } else { self.share * far + (1.0 - self.share) * near }
+    }
+
     fn jerk(&self, slopes: Slopes) -> f64 {
         let (far, near) = (self.jerk_of(slopes.far), self.jerk_of(slopes.near));
         if slopes.far == slopes.near { far } else { self.share * far + (1.0 - self.share) * near }
@@ -230,7 +242,7 @@ impl Profile {
         }
         let next = index + 1;
         let duration = if next < self.count() { self.instant(next).since(self.instant(index)) } else { f64::INFINITY };
-        let jerk = self.jerk(Slopes::of(self.codes, index));
+        let jerk = self.jerk_at(index);
         Some(Segment { start_time: self.times[index], duration, start: self.state(index), jerk })
     }
 
@@ -266,7 +278,7 @@ impl Profile {
             index += 1;
         }
         *segment = index as u8;
-        self.state(index).advanced(time - self.times[index], self.jerk(Slopes::of(self.codes, index)))
+        self.state(index).advanced(time - self.times[index], self.jerk_at(index))
     }
 
     /// The state at `time`; before the start, the start.
@@ -276,7 +288,7 @@ impl Profile {
         let time = time.max(0.0);
         let passed = self.times.iter().map(|&start| usize::from(start <= time)).sum::<usize>();
         let index = (passed.max(1) - 1).min(SEGMENTS_MAX - 1);
-        self.state(index).advanced(time - self.times[index], self.jerk(Slopes::of(self.codes, index)))
+        self.state(index).advanced(time - self.times[index], self.jerk_at(index))
     }
 }
 
@@ -295,12 +307,6 @@ impl Slopes {
             _ => 0,
         };
         code(self.far) | code(self.near) << 2
-    }
-
-    fn of(codes: u64, index: usize) -> Self {
-        let code = codes >> (4 * index);
-        let slope = |code: u64| (code & 1) as i8 - (code >> 1 & 1) as i8;
-        Slopes { far: slope(code), near: slope(code >> 2) }
     }
 }
 

@@ -118,9 +118,14 @@ impl Reach {
 
     /// The motion that takes `time`, which must be a possible duration.
     pub(crate) fn mixture(&self, time: f64) -> Mixture {
-        let (far, near) = (self.far.shape(time), self.near.shape(time));
-        let (high, low) = (self.far.distance(&far), -self.near.distance(&near));
-        let share = if self.distance >= high || high <= low {
+        let far = self.far.shape(time);
+        let high = self.far.distance(&far);
+        if self.distance >= high {
+            return Mixture { far, near: far, share: 1.0 };
+        }
+        let near = self.near.shape(time);
+        let low = -self.near.distance(&near);
+        let share = if high <= low {
             1.0
         } else if self.distance <= low {
             0.0
@@ -134,6 +139,8 @@ impl Reach {
 impl Mixture {
     /// The phases of the two motions, the nearest one with its signs turned, and the share of the first.
     pub(crate) fn phases(&self, reach: &Reach) -> ([Phase; 7], [Phase; 7], f64) {
-        (reach.far.phases(&self.far), reach.near.phases(&self.near), self.share)
+        let far = reach.far.phases(&self.far);
+        let near = if self.share >= 1.0 { far } else { reach.near.phases(&self.near) };
+        (far, near, self.share)
     }
 }
