@@ -15,7 +15,7 @@ use crate::timing::{Realtime, Timing};
 use std::path::{Component, Path, PathBuf};
 use tandem_controller::Params;
 
-const HOME: Bound = bound("home_rad", "rad", -6.2832, 6.2832);
+const HOME: Bound = bound("home_rad", "rad", -6.3, 6.3);
 const ACCELERATION: Bound = bound("acceleration_max_rad_s2", "rad/s2", 0.1, 100.0);
 const JERK: Bound = bound("jerk_max_rad_s3", "rad/s3", 1.0, 10_000.0);
 

@@ -13,7 +13,7 @@ const GRASP_WIDTH: Bound = bound("grasp_width_m", "m", 0.0, 0.2);
 const CAPTURE: Bound = bound("position_m", "m", 0.0005, 0.05);
 const CAPTURE_TURN: Bound = bound("angle_rad", "rad", 0.005, 0.5);
 const TILT: Bound = bound("view_tilt_rad", "rad", 0.0, 1.2);
-const TURN: Bound = bound("view_turn_rad", "rad", -3.1416, 3.1416);
+const TURN: Bound = bound("view_turn_rad", "rad", -3.2, 3.2);
 
 /// Parts a product may have: as many as a scene has room for beside the cell itself.
 const PARTS_MAX: usize = 24;

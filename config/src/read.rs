@@ -218,7 +218,7 @@ impl<'d> Table<'d> {
     }
 
     fn wrong_type(&self, key: &str, value: &Spanned<DeValue<'_>>, wanted: &str) {
-        let found = format!("a {}", value.get_ref().type_str());
+        let found = kind_of(value);
         self.reading.note(self.fault_in(value.span(), self.field(key), found, wanted, "write it as that"));
     }
 
@@ -229,8 +229,8 @@ impl<'d> Table<'d> {
                 let digits = integer.as_str().replace('_', "");
                 (i64::from_str_radix(&digits, integer.radix()).ok().map(|n| n as f64), integer.to_string())
             }
-            other => {
-                let found = format!("a {}", other.type_str());
+            _ => {
+                let found = kind_of(value);
                 let fault = self.fault_in(value.span(), field, found, &bound.allowed(), "write a number");
                 self.reading.note(fault);
                 return bound.min;
@@ -434,7 +434,7 @@ impl<'d> Table<'d> {
     /// The pose whose numbers stand directly in this table.
     pub(crate) fn own_pose(&self) -> Isometry3<f64> {
         const POSITION: Bound = bound("position_m", "m", -5.0, 5.0);
-        const TURN: Bound = bound("rpy_rad", "rad", -6.2832, 6.2832);
+        const TURN: Bound = bound("rpy_rad", "rad", -6.3, 6.3);
         let position: [f64; 3] = self.numbers(&POSITION);
         let [roll, pitch, yaw] = if self.has(TURN.key) { self.numbers(&TURN) } else { [0.0; 3] };
         Isometry3::from_parts(Translation3::from(position), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
@@ -464,6 +464,13 @@ impl Drop for Table<'_> {
             }
         }
     }
+}
+
+/// What stands there instead, with its article.
+fn kind_of(value: &Spanned<DeValue<'_>>) -> String {
+    let kind = value.get_ref().type_str();
+    let article = if kind.starts_with(['a', 'i']) { "an" } else { "a" };
+    format!("{article} {kind}")
 }
 
 /// The known key that differs from `name` only in its unit, or by at most two letters.

@@ -42,7 +42,7 @@ impl Screen {
             }
             EventKind::BoxStarted { number } => {
                 self.line(&format!("\n[{time:7.2} s] box {number} of {}", self.boxes));
-                self.line(&format!("{HEAD}"));
+                self.line(HEAD);
             }
             EventKind::StepStarted { label, .. } => self.bar.set_message(label.clone()),
             EventKind::ActionStarted { subject, subtask, part } => {

@@ -25,8 +25,21 @@ pub struct Card {
     pub temperature: f64,
     /// Smallest probability that may be acted on: chosen on validation.
     pub threshold: f64,
+    /// How much the fitted wall's winding tells threads from smooth walls: the threaded class's
+    /// logit grows by gain × (winding − level). Chosen on validation.
+    pub winding: WindingCard,
     /// How it does on the test split.
     pub metrics: Metrics,
+}
+
+/// Weight of the winding.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WindingCard {
+    /// Logits a share of one.
+    pub gain: f64,
+    /// Share at which it is no evidence either way.
+    pub level: f64,
 }
 
 /// What a model was trained on.
@@ -109,6 +122,9 @@ impl Card {
         }
         if !(0.0..=1.0).contains(&card.threshold) {
             return refuse("threshold", card.threshold.to_string(), "0..=1");
+        }
+        if !(0.0..=200.0).contains(&card.winding.gain) || !(0.0..=1.0).contains(&card.winding.level) {
+            return refuse("winding", format!("{:?}", card.winding), "gain 0..=200, level 0..=1");
         }
         Ok(card)
     }

@@ -25,7 +25,7 @@ use tandem_msg::{
     Code, Coded, FEATURE_CLASSES, Feature, FeatureClass, FeatureDimensions, PointCloud, Pose, Recognition, Stamp,
 };
 
-pub use card::Card;
+pub use card::{Card, WindingCard};
 pub use fit::{Fit, fit};
 pub use model::{Answer, CARD_FILE, Model, ModelError, WEIGHTS_FILE};
 pub use sample::{Sample, Sampler};
@@ -101,7 +101,7 @@ impl Perception {
         feature.class = Code::of(recognised.class);
         feature.segment_count = recognised.segment_count;
         feature.probabilities = recognised.probabilities;
-        if let Some(Fit { camera_from_feature, dimensions }) = recognised.fit {
+        if let Some(Fit { camera_from_feature, dimensions, .. }) = recognised.fit {
             feature.dimensions = dimensions;
             feature.base_from_feature = pose(&(isometry(&cloud.base_from_camera) * camera_from_feature));
         }
@@ -112,14 +112,44 @@ impl Perception {
     pub fn recognise(&mut self, cloud: &[[f32; 3]]) -> Option<Recognised> {
         let sample = self.sampler.sample(cloud)?;
         let answer = self.model.answer(&sample)?;
-        let probabilities = self.model.probabilities(&answer.logits);
-        let best =
-            (0..FEATURE_CLASSES).max_by(|&a, &b| probabilities[a].total_cmp(&probabilities[b]).then(b.cmp(&a)))?;
-        let class = *FeatureClass::ALL.iter().find(|class| class.code() as usize == best)?;
-        let fit = fit(cloud, &sample, &answer.segment, class).filter(finite);
+        let mut logits = answer.logits;
+        let mut class = class_of(&logits)?;
+        let mut fit = fit(cloud, &sample, &answer.segment, class).filter(finite);
+        if let Some(winding) = fit.and_then(|fit| fit.winding) {
+            logits = weigh_winding(logits, class, winding, &self.card().winding);
+            let weighed = class_of(&logits)?;
+            if weighed != class {
+                class = weighed;
+                fit = fit::fit(cloud, &sample, &answer.segment, class).filter(finite);
+            }
+        }
+        let probabilities = self.model.probabilities(&logits);
         let segment_count = answer.segment.iter().filter(|s| **s).count() as u32;
         Some(Recognised { class, probabilities, segment_count, fit })
     }
+}
+
+/// The class of the largest logit.
+pub fn class_of(logits: &[f32; FEATURE_CLASSES]) -> Option<FeatureClass> {
+    let best = (0..FEATURE_CLASSES).max_by(|&a, &b| logits[a].total_cmp(&logits[b]).then(b.cmp(&a)))?;
+    FeatureClass::ALL.iter().copied().find(|class| class.code() as usize == best)
+}
+
+/// Logits after the evidence of a fitted wall: what 512 points cannot resolve, the periodicity
+/// of all points along the helix may.
+pub fn weigh_winding(
+    mut logits: [f32; FEATURE_CLASSES],
+    class: FeatureClass,
+    winding: f64,
+    card: &WindingCard,
+) -> [f32; FEATURE_CLASSES] {
+    let threaded = match class {
+        FeatureClass::ThreadedHole | FeatureClass::SmoothHole => FeatureClass::ThreadedHole,
+        FeatureClass::ThreadedAxis | FeatureClass::SmoothAxis => FeatureClass::ThreadedAxis,
+        _ => return logits,
+    };
+    logits[threaded.code() as usize] += (card.gain * (winding - card.level)) as f32;
+    logits
 }
 
 fn sound(points: &[[f32; 3]]) -> bool {

@@ -1,9 +1,13 @@
 //! What a look at a part is worth: may the recognition be acted on?
+//!
+//! A recognition that is sure by itself counts; so does one that is less sure but
+//! points at the part that was called for, since carriers are seldom misloaded.
+//! Anything else is a doubt with its reason.
 
 use super::placing::nominal_at_station;
 use nalgebra::{Isometry3, Translation3, Vector3};
 use tandem_config::{Cell, Part, isometry_of};
-use tandem_msg::{Feature, FeatureClass, Recognition};
+use tandem_msg::{FEATURE_CLASSES, Feature, FeatureClass, Recognition};
 
 /// What is known of a presented part.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -91,25 +95,29 @@ pub(super) fn judge(cell: &Cell, part: &Part, feature: &Feature) -> Result<Recog
     if !confidence.is_finite() || !measured.iter().all(|value| value.is_finite()) {
         return Err(Doubt::NotFinite);
     }
+    let expected = part.feature.class;
+    let certain = class == expected && certainty(confidence, cell) >= cell.perception.certainty_min;
     match feature.recognition.get() {
         Some(Recognition::Sure) => {}
+        Some(Recognition::Unsure) if certain => {}
         Some(Recognition::Unsure) => return Err(Doubt::Unsure { class, confidence }),
         Some(Recognition::NoPart) | None => return Err(Doubt::NoPart),
     }
-    let expected = part.feature.class;
     if class != expected {
         return Err(Doubt::OtherClass { class, expected });
     }
     let base_from_feature = isometry_of(&feature.base_from_feature).ok_or(Doubt::NotFinite)?;
     let nominal = nominal_at_station(cell, part);
     let nominal_feature = nominal * part.part_from_feature;
-    let shift = base_from_feature.translation.vector - nominal_feature.translation.vector;
+    let mut shift = base_from_feature.translation.vector - nominal_feature.translation.vector;
     let axis = |pose: &Isometry3<f64>| pose.rotation * Vector3::z();
     let tilt = axis(&base_from_feature).angle(&axis(&nominal_feature));
     let offset = shift.norm();
     if offset > cell.perception.offset_max || tilt > cell.perception.tilt_max {
         return Err(Doubt::OffPlace { offset, tilt });
     }
+    // The part lies on its carrier, whose height is known better than it is seen.
+    shift.z = 0.0;
     for (name, measured, expected) in
         [("diameter", measured[0], part.feature.diameter), ("length", measured[2], part.feature.length)]
     {
@@ -125,8 +133,18 @@ pub(super) fn judge(cell: &Cell, part: &Part, feature: &Feature) -> Result<Recog
         by_person: false,
         dimensions: measured,
         base_from_part: Translation3::from(shift) * nominal,
-        offset,
+        offset: shift.norm(),
     })
+}
+
+/// Probability that the part called for lies there, when perception gives its class the
+/// probability `seen`: Bayes' rule with the share of misloaded carriers as prior, a
+/// misloaded part being of any other class alike.
+fn certainty(seen: f64, cell: &Cell) -> f64 {
+    let misload = cell.perception.misload_probability;
+    let right = seen * (1.0 - misload);
+    let wrong = (1.0 - seen) * misload / (FEATURE_CLASSES - 1) as f64;
+    right / (right + wrong)
 }
 
 /// What a person's word makes of a part: its class is theirs, its place and size the file's.

@@ -31,8 +31,16 @@ fn all_faults_of_all_files_are_told_at_once() {
     let answer = files.tandem(&["check", "cells/s471.toml"]);
     let said: Vec<&str> = answer.err.lines().collect();
     assert_eq!(said.len(), 3, "{answer:?}");
-    assert!(said[0].ends_with("timing.controller.period_us = 50 us, allowed 250..=1000000 us; choose a value within these bounds"), "{said:?}");
-    assert!(said[1].ends_with("human.walk_speed_m_s = 14 m/s, allowed 0.1..=2 m/s; choose a value within these bounds"), "{said:?}");
+    assert!(
+        said[0].ends_with(
+            "timing.controller.period_us = 50 us, allowed 250..=1000000 us; choose a value within these bounds"
+        ),
+        "{said:?}"
+    );
+    assert!(
+        said[1].ends_with("human.walk_speed_m_s = 14 m/s, allowed 0.1..=2 m/s; choose a value within these bounds"),
+        "{said:?}"
+    );
     assert!(said[2].ends_with("part[0].mass_kg = a string, allowed 0.001..=100 kg; write a number"), "{said:?}");
     assert!(said.iter().all(|line| line.split(':').nth(1).is_some_and(|n| n.parse::<u32>().is_ok())), "{said:?}");
     assert_eq!(answer.code, Some(3));
@@ -57,7 +65,10 @@ fn a_urdf_that_is_no_chain_is_refused_with_the_joints_that_branch_off() {
     files.replace("robots/ur10.urdf", "<parent link=\"forearm_link\"", "<parent link=\"base_link\"");
     let answer = files.tandem(&["run", "cells/s471.toml"]);
     assert_eq!(answer.code, Some(3), "{answer:?}");
-    assert!(answer.err.starts_with("robots/ur10.urdf:") && answer.err.contains("beside the chain to \"tcp\""), "{answer:?}");
+    assert!(
+        answer.err.starts_with("robots/ur10.urdf:") && answer.err.contains("beside the chain to \"tcp\""),
+        "{answer:?}"
+    );
 }
 
 /// One flipped byte in the weights: the run is refused before anything starts.

@@ -5,7 +5,9 @@ use crate::bench::Files;
 #[test]
 fn usage_errors_have_their_own_exit_code() {
     let files = Files::new();
-    for args in [&["frobnicate"][..], &["run"], &["run", "cells/s471.toml", "--boxes", "0"], &["run", "x", "--seed", "-1"]] {
+    for args in
+        [&["frobnicate"][..], &["run"], &["run", "cells/s471.toml", "--boxes", "0"], &["run", "x", "--seed", "-1"]]
+    {
         let answer = files.tandem(args);
         assert_eq!((answer.code, answer.out.as_str()), (Some(2), ""), "{args:?}: {answer:?}");
         assert!(answer.err.starts_with("error: "), "{args:?}: {answer:?}");
@@ -55,7 +57,9 @@ fn a_run_speaks_json_and_leaves_its_journal() {
             answer.out.lines().map(|line| serde_json::from_str(line).expect("an object a line")).collect();
         let summary = lines.last_mut().expect("a run says something");
         assert_eq!(summary["event"], "summary", "{summary}");
-        for field in ["product", "boxes_requested", "boxes_completed", "steps_done", "steps_failed", "stops", "contacts"] {
+        for field in
+            ["product", "boxes_requested", "boxes_completed", "steps_done", "steps_failed", "stops", "contacts"]
+        {
             assert!(!summary[field].is_null(), "{field}: {summary}");
         }
         assert!(summary["wall_time_s"].take().is_number());

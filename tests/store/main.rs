@@ -44,8 +44,11 @@ fn entry(seq: u64, step: u32, state: StepState) -> JournalEntry {
     }
 }
 
-/// What a store promises; each is given the URL of an empty database.
-const PROMISES: [(&str, fn(&str)); 8] = [
+/// A promise by name; it is given the URL of an empty database.
+type Promise = (&'static str, fn(&str));
+
+/// What a store promises.
+const PROMISES: [Promise; 8] = [
     ("a_second_start_finds_what_the_first_left", a_second_start_finds_what_the_first_left),
     ("the_library_follows_its_files_and_keeps_the_users_rows", the_library_follows_its_files_and_keeps_the_users_rows),
     ("four_first_starts_at_once", four_first_starts_at_once),

@@ -1,43 +1,14 @@
 //! A cycle allocates nothing, whatever it does: planning, moving, acting, stopping, refusing.
-#![allow(
-    unsafe_code,
-    clippy::disallowed_types,
-    clippy::disallowed_macros,
-    reason = "counting allocations takes an allocator"
-)]
+#![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "tests may allocate and print")]
 
 mod cell;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell as Slot;
-
 use cell::{Cell, down, task};
+use tandem_cycle::guard::{CountingAllocator, counted};
 use tandem_msg::*;
 
-thread_local! {
-    static COUNT: Slot<u64> = const { Slot::new(0) };
-}
-
-struct Counting;
-
-// SAFETY: every call is passed on to the system's allocator unchanged; the count is a plain number of
-// the calling thread, and reaching it allocates nothing.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        let _ = COUNT.try_with(|count| count.set(count.get() + 1));
-        // SAFETY: the caller keeps the contract of `dealloc`.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 #[test]
 fn ten_thousand_cycles_allocate_nothing() {
@@ -71,10 +42,8 @@ fn ten_thousand_cycles_allocate_nothing() {
             10_500 => cell.arm.position[0] = f64::NAN,
             _ => {}
         }
-        let before = COUNT.with(Slot::get);
-        cell.step();
-        let after = COUNT.with(Slot::get);
-        assert_eq!(after - before, 0, "cycle {cycle}: {:#?}", cell.status());
+        let ((), calls) = counted(|| cell.step());
+        assert!(calls.is_none(), "cycle {cycle}: {calls:?} {:#?}", cell.status());
         phases.insert(cell.phase());
         causes.insert(cell.cause());
         moved += u64::from(cell.moving());

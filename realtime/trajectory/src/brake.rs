@@ -12,6 +12,14 @@
 //! ```
 //!
 //! The time-optimal motion proper starts there. A velocity below `W` is the same, mirrored.
+//!
+//! That is the fastest way back, but it arrives at `V` still slowing down, so the velocity dips below
+//! the limit before it can stay there: by `alpha a^2 / 2`, which after a limit has been lowered on the
+//! fly may be all of it. A *soft* return gives the acceleration back in time and comes to `V` with none:
+//!
+//! ```text
+//! a^2 = (beta a0^2 + 2 (v0 - V)) / (alpha + beta)         zeroing -|a| by the jerk arrives at V
+//! ```
 
 use crate::{
     extremal::{Joint, Phase},
@@ -21,16 +29,20 @@ use crate::{
 /// Relative excess over a velocity limit that counts as being on it: roundings of the inputs.
 const TIE: f64 = 16.0 * f64::EPSILON;
 
+/// A soft return falls, waits and rises; others do with two.
+pub(crate) const STEPS_MAX: usize = 3;
+
 /// The steps before the motion proper, and the velocity and acceleration they end with.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prefix {
     /// Unused steps have no duration.
-    pub(crate) steps: [Phase; 2],
+    pub(crate) steps: [Phase; STEPS_MAX],
     pub(crate) end: [f64; 2],
 }
 
-/// The prefix of a joint starting at `joint.start`; `velocity_min` is its lowest velocity.
-pub(crate) fn prefix(joint: &Joint, velocity_min: f64) -> Prefix {
+/// The prefix of a joint starting at `joint.start`; `velocity_min` is its lowest velocity. `soft` asks
+/// for a return to the velocity limit that does not dip below it.
+pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Prefix {
     let velocity = joint.start[0];
     let mut prefix = Prefix::none(joint);
     if joint.rise + joint.fall == 0.0 {
@@ -41,17 +53,15 @@ pub(crate) fn prefix(joint: &Joint, velocity_min: f64) -> Prefix {
         } else {
             return prefix;
         };
-        prefix.steps[0] = Phase {
-            duration: (limit - velocity) / braking,
-            velocity,
-            acceleration: braking,
-            slope: 0,
-        };
+        prefix.steps[0] = Phase { duration: (limit - velocity) / braking, velocity, acceleration: braking, slope: 0 };
         prefix.end = [limit, 0.0];
         return prefix;
     }
     prefix.contain(joint);
     let below = joint.mirrored(-velocity_min);
+    if soft && (prefix.settle(joint, 1.0) || prefix.settle(&below, -1.0)) {
+        return prefix;
+    }
     if !prefix.lower(joint, velocity_min, 1.0) {
         prefix.lower(&below, -joint.peak, -1.0);
     }
@@ -70,78 +80,70 @@ pub(crate) fn acceleration_prefix(joint: &Joint) -> Prefix {
 impl Prefix {
     /// No prefix.
     pub(crate) fn none(joint: &Joint) -> Self {
-        Prefix {
-            steps: [Phase::default(); 2],
-            end: joint.start,
-        }
+        Prefix { steps: [Phase::default(); STEPS_MAX], end: joint.start }
     }
 
     /// Brings the acceleration into its band.
     fn contain(&mut self, joint: &Joint) {
         let acceleration = self.end[1];
         if acceleration > joint.top {
-            self.push(
-                (acceleration - joint.top) * joint.fall,
-                joint.fall,
-                -1,
-                joint.top,
-            );
+            self.push((acceleration - joint.top) * joint.fall, joint.fall, -1, joint.top);
         } else if acceleration < -joint.bottom {
-            self.push(
-                (-joint.bottom - acceleration) * joint.rise,
-                joint.rise,
-                1,
-                -joint.bottom,
-            );
+            self.push((-joint.bottom - acceleration) * joint.rise, joint.rise, 1, -joint.bottom);
         }
     }
 
     /// Appends a step that changes the acceleration to `to`; one over the jerk is `inverse`.
     fn push(&mut self, duration: f64, inverse: f64, slope: i8, to: f64) {
         let [velocity, acceleration] = self.end;
-        let step = Phase {
-            duration,
-            velocity,
-            acceleration,
-            slope,
-        };
+        let step = Phase { duration, velocity, acceleration, slope };
         let gain = if slope == 0 {
             acceleration * duration
         } else {
             f64::from(slope) * inverse * (to - acceleration) * (to + acceleration) / 2.0
         };
         self.end = [velocity + gain, to];
-        let [first, second] = &mut self.steps;
-        if first.duration == 0.0 {
-            *first = step;
-        } else if first.slope == slope && slope != 0 && second.duration == 0.0 {
-            first.duration += duration;
-        } else {
-            *second = step;
+        let used = self.steps.iter().take_while(|step| step.duration > 0.0).count();
+        match self.steps[..used].last_mut() {
+            Some(last) if last.slope == slope && slope != 0 => last.duration += duration,
+            _ if used < STEPS_MAX => self.steps[used] = step,
+            _ => {}
         }
+    }
+
+    /// Brings the velocity to the limit `joint.peak` and the acceleration to zero, if the velocity is
+    /// above or bound to pass it and need not fall below. `joint` is seen with signs turned by `sign`;
+    /// says whether anything was to do.
+    fn settle(&mut self, joint: &Joint, sign: f64) -> bool {
+        let Joint { peak, bottom, rise, fall, .. } = *joint;
+        let (v, a) = (sign * self.end[0], sign * self.end[1]);
+        let bound = if a > 0.0 { v + fall * a * a / 2.0 } else { v - rise * a * a / 2.0 };
+        if bound <= peak + TIE * (peak.abs() + v.abs() + (rise + fall) * a * a) {
+            return false;
+        }
+        let turn = sqrt((fall * a * a + 2.0 * (v - peak)) / (rise + fall)).min(bottom).max(-a);
+        let (down, up) = if sign > 0.0 { (-1, 1) } else { (1, -1) };
+        self.push(fall * (a + turn), fall, down, -sign * turn);
+        let wait = (sign * self.end[0] - rise * turn * turn / 2.0 - peak) / turn;
+        if turn == bottom && wait > 0.0 {
+            self.push(wait, 0.0, 0, -sign * turn);
+        }
+        self.push(rise * turn, rise, up, 0.0);
+        self.end = [sign * peak, 0.0];
+        true
     }
 
     /// Brings the velocity down to the limit `joint.peak` if it is above or bound to pass it.
     /// `joint` is seen with signs turned by `sign`; says whether anything was to do.
     fn lower(&mut self, joint: &Joint, velocity_min: f64, sign: f64) -> bool {
-        let Joint {
-            peak,
-            bottom,
-            rise,
-            fall,
-            ..
-        } = *joint;
+        let Joint { peak, bottom, rise, fall, .. } = *joint;
         let (v, a) = (sign * self.end[0], sign * self.end[1]);
         let bound = if a > 0.0 { v + fall * a * a / 2.0 } else { v };
         let scale = peak.abs() + v.abs() + fall * a * a;
         if bound <= peak + TIE * scale || (a <= 0.0 && v - rise * a * a / 2.0 <= velocity_min) {
             return false;
         }
-        let at_peak = if fall > 0.0 {
-            a * a + 2.0 * (v - peak) / fall
-        } else {
-            f64::INFINITY
-        };
+        let at_peak = if fall > 0.0 { a * a + 2.0 * (v - peak) / fall } else { f64::INFINITY };
         let at_floor = (fall * a * a + 2.0 * (v - velocity_min)) / (rise + fall);
         let to = -sqrt(at_peak.min(at_floor).max(0.0)).min(bottom);
         let slope = if sign > 0.0 { -1 } else { 1 };

@@ -36,6 +36,11 @@ pub enum Error {
         /// Index of the joint.
         joint: usize,
     },
+    /// The motion would pass a position limit.
+    PositionLimit {
+        /// Index of the joint.
+        joint: usize,
+    },
     /// The numbers are too large or too different in size for double precision.
     OutOfRange {
         /// Index of the joint.
@@ -54,6 +59,7 @@ impl Error {
             | Error::TargetAcceleration { joint }
             | Error::Unreachable { joint }
             | Error::NotStraight { joint }
+            | Error::PositionLimit { joint }
             | Error::OutOfRange { joint } => joint,
         }
     }
@@ -72,6 +78,7 @@ impl fmt::Display for Error {
             }
             Error::Unreachable { .. } => "the velocity limit towards the target is zero",
             Error::NotStraight { .. } => "start and target do not lie on a straight line",
+            Error::PositionLimit { .. } => "the motion would pass a position limit",
             Error::OutOfRange { .. } => "the numbers are too far apart for double precision",
         };
         write!(f, "joint {}: {reason}", self.joint())

@@ -26,12 +26,7 @@ pub struct Extrema {
 
 /// The times inside a segment at which its velocity is zero, rising; the segment's ends around them.
 fn turns(segment: &Segment) -> [f64; 4] {
-    let (v, a, j, end) = (
-        segment.start.velocity,
-        segment.start.acceleration,
-        segment.jerk,
-        segment.duration,
-    );
+    let (v, a, j, end) = (segment.start.velocity, segment.start.acceleration, segment.jerk, segment.duration);
     let inside = |time: f64| if time > 0.0 && time < end { time } else { end };
     let roots = if j == 0.0 {
         [-v / a, end]
@@ -52,14 +47,8 @@ impl Profile {
     /// No allocation; at most 14 segments of three pieces.
     #[must_use]
     pub fn extrema(&self) -> Extrema {
-        let start = Reached {
-            position: self.at(0.0).position,
-            time: 0.0,
-        };
-        let mut extrema = Extrema {
-            lowest: start,
-            highest: start,
-        };
+        let start = Reached { position: self.at(0.0).position, time: 0.0 };
+        let mut extrema = Extrema { lowest: start, highest: start };
         let mut note = |position: f64, time: f64| {
             if position < extrema.lowest.position {
                 extrema.lowest = Reached { position, time };
@@ -72,10 +61,7 @@ impl Profile {
             note(segment.start.position, segment.start_time);
             if segment.duration.is_finite() {
                 for time in &turns(&segment)[1..3] {
-                    note(
-                        segment.start.advanced(*time, segment.jerk).position,
-                        segment.start_time + time,
-                    );
+                    note(segment.start.advanced(*time, segment.jerk).position, segment.start_time + time);
                 }
             }
         }
@@ -106,11 +92,7 @@ impl Profile {
                         let state = segment.start.advanced(time, segment.jerk);
                         (sign * (state.position - position), sign * state.velocity)
                     };
-                    let time = if high == 0.0 {
-                        to
-                    } else {
-                        root_between(value, from, to)
-                    };
+                    let time = if high == 0.0 { to } else { root_between(value, from, to, from + (to - from) / 2.0) };
                     return Some(segment.start_time + time);
                 }
             }

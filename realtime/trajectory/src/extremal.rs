@@ -33,9 +33,11 @@
 //! dP/dT = w - beta x y / 2     before the cruise,      dP/dT = V     with it
 //! ```
 //!
-//! whose zeros are roots of quadratics in each case. They, the changes of case and the start of
-//! the cruise cut the curve P(T) into at most 16 pieces, on each of which it is monotone and
-//! given by one formula.
+//! Once the fall reaches from a positive `x` to a negative `y`, this only grows, up to the cruise: the
+//! curve P(T) is convex, and a distance not yet covered is first covered at one place, found by
+//! Newton's iteration. Before that, where both have the same sign, the zeros of the slope, which are
+//! roots of quadratics in each case, and the changes of case cut the curve into at most 16 pieces, on
+//! each of which it is monotone and given by one formula.
 
 use crate::{root::root_between, sqrt::sqrt};
 
@@ -138,24 +140,13 @@ const LOOSE: f64 = 32768.0;
 impl Tie {
     /// `rounding` is that of the inputs, `allowed` what the caller allows.
     pub(crate) fn new(rounding: f64, allowed: f64) -> Self {
-        Tie {
-            tight: rounding + allowed,
-            loose: LOOSE * rounding + allowed,
-        }
+        Tie { tight: rounding + allowed, loose: LOOSE * rounding + allowed }
     }
 }
 
 impl Extremal {
     pub(crate) fn new(joint: Joint) -> Self {
-        let Joint {
-            start: [v0, a0],
-            end: [vf, af],
-            peak,
-            top,
-            bottom,
-            rise,
-            fall,
-        } = joint;
+        let Joint { start: [v0, a0], end: [vf, af], peak, top, bottom, rise, fall } = joint;
         let mean = (rise + fall) / 2.0;
         let k_start = v0 - rise * a0 * a0 / 2.0;
         let k_end = vf - rise * af * af / 2.0;
@@ -163,49 +154,20 @@ impl Extremal {
         let k_gain = (vf - v0) - rise * (af - a0) * (af + a0) / 2.0;
         let (high, hold_high) = climb(peak - k_start, top, mean);
         let (low, hold_low) = climb(peak - k_end, bottom, mean);
-        let peak_shape = Shape {
-            high,
-            low: -low,
-            crest: peak,
-            hold_high,
-            cruise: 0.0,
-            hold_low,
-        };
+        let peak_shape = Shape { high, low: -low, crest: peak, hold_high, cruise: 0.0, hold_low };
         let offset = rise * (af - a0);
-        let ramps = if mean == 0.0 {
-            0.0
-        } else {
-            2.0 * mean * (high + low)
-        };
+        let ramps = if mean == 0.0 { 0.0 } else { 2.0 * mean * (high + low) };
         let peak_time = (offset + ramps + hold_high + hold_low).max(0.0);
         let c = if mean == 0.0 { 0.0 } else { k_gain / mean };
-        Extremal {
-            joint,
-            k_start,
-            k_end,
-            c,
-            mean,
-            offset,
-            peak_shape,
-            peak_time,
-        }
+        Extremal { joint, k_start, k_end, c, mean, offset, peak_shape, peak_time }
     }
 
     /// The farthest motion of duration `time`, which must be a possible one ([`crate::swing`]).
     pub(crate) fn shape(&self, time: f64) -> Shape {
         if time >= self.peak_time {
-            return Shape {
-                cruise: time - self.peak_time,
-                ..self.peak_shape
-            };
+            return Shape { cruise: time - self.peak_time, ..self.peak_shape };
         }
-        let Joint {
-            start: [_, a0],
-            end: [_, af],
-            top,
-            bottom,
-            ..
-        } = self.joint;
+        let Joint { start: [_, a0], end: [_, af], top, bottom, .. } = self.joint;
         let (mean, c) = (self.mean, self.c);
         if mean == 0.0 {
             return self.both_held(time);
@@ -248,40 +210,19 @@ impl Extremal {
     /// The shape without holds.
     fn turning(&self, high: f64, low: f64) -> Shape {
         let crest = (self.k_start + self.k_end + self.mean * (high * high + low * low)) / 2.0;
-        Shape {
-            high,
-            low,
-            crest,
-            hold_high: 0.0,
-            cruise: 0.0,
-            hold_low: 0.0,
-        }
+        Shape { high, low, crest, hold_high: 0.0, cruise: 0.0, hold_low: 0.0 }
     }
 
     fn held_high(&self, low: f64, s: f64) -> Shape {
         let (high, crest) = (self.joint.top, self.k_end + self.mean * low * low);
         let hold_high = (2.0 * self.mean * (s - (high - low))).max(0.0);
-        Shape {
-            high,
-            low,
-            crest,
-            hold_high,
-            cruise: 0.0,
-            hold_low: 0.0,
-        }
+        Shape { high, low, crest, hold_high, cruise: 0.0, hold_low: 0.0 }
     }
 
     fn held_low(&self, high: f64, s: f64) -> Shape {
         let (low, crest) = (-self.joint.bottom, self.k_start + self.mean * high * high);
         let hold_low = (2.0 * self.mean * (s - (high - low))).max(0.0);
-        Shape {
-            high,
-            low,
-            crest,
-            hold_high: 0.0,
-            cruise: 0.0,
-            hold_low,
-        }
+        Shape { high, low, crest, hold_high: 0.0, cruise: 0.0, hold_low }
     }
 
     fn both_held(&self, time: f64) -> Shape {
@@ -290,33 +231,13 @@ impl Extremal {
         let crest = (free + self.k_start / top + self.k_end / bottom) / (1.0 / top + 1.0 / bottom);
         let hold_high = ((crest - self.k_start) / top - self.mean * top).max(0.0);
         let hold_low = ((crest - self.k_end) / bottom - self.mean * bottom).max(0.0);
-        Shape {
-            high: top,
-            low: -bottom,
-            crest,
-            hold_high,
-            cruise: 0.0,
-            hold_low,
-        }
+        Shape { high: top, low: -bottom, crest, hold_high, cruise: 0.0, hold_low }
     }
 
     /// Distance covered by a shape.
     pub(crate) fn distance(&self, shape: &Shape) -> f64 {
-        let Joint {
-            start: [_, a0],
-            end: [_, af],
-            rise,
-            fall,
-            ..
-        } = self.joint;
-        let Shape {
-            high: x,
-            low: y,
-            crest,
-            hold_high,
-            cruise,
-            hold_low,
-        } = *shape;
+        let Joint { start: [_, a0], end: [_, af], rise, fall, .. } = self.joint;
+        let Shape { high: x, low: y, crest, hold_high, cruise, hold_low } = *shape;
         let (xx, yy) = (x * x, y * y);
         let mut distance = cruise * crest;
         if self.mean > 0.0 {
@@ -360,60 +281,71 @@ impl Extremal {
 
     /// The first duration in `[from, to]` at which `distance` is covered, when less is covered at
     /// `from`.
-    pub(crate) fn first_covering(
-        &self,
-        distance: f64,
-        tie: Tie,
-        from: f64,
-        to: f64,
-    ) -> Option<f64> {
-        let mut marks = Marks::between(from, to.min(self.peak_time));
-        if from < self.peak_time {
+    pub(crate) fn first_covering(&self, distance: f64, tie: Tie, from: f64, to: f64) -> Option<f64> {
+        let exact = |time: f64| {
+            let shape = self.shape(time);
+            let off = self.distance(&shape) - distance;
+            let known = off.abs() <= self.tolerance(time, &shape) / 16.0;
+            (if known { 0.0 } else { off }, self.slope(&shape))
+        };
+        let (mut begin, mut before) = (from, self.distance_in(from));
+        let convex = self.convex_from();
+        if from < convex {
+            let end = to.min(convex);
+            let mut marks = Marks::between(from, end);
             self.mark_pieces(&mut marks);
-            marks.push(to.min(self.peak_time));
+            marks.push(end);
+            for &mark in marks.sorted() {
+                let covered = self.distance_in(mark);
+                if covered >= distance - tie.tight {
+                    let middle = begin + (mark - begin) / 2.0;
+                    return Some(if covered <= distance { mark } else { root_between(exact, begin, mark, middle) });
+                }
+                if covered < before && before >= distance - tie.loose {
+                    return Some(begin);
+                }
+                (begin, before) = (mark, covered);
+            }
         }
-        let (mut piece_start, mut before) = (from, self.distance_in(from));
-        for &mark in marks.sorted() {
-            let covered = self.distance_in(mark);
+        let end = to.min(self.peak_time);
+        if begin < end {
+            if before >= distance - tie.loose && self.slope(&self.shape(begin)) < 0.0 {
+                return Some(begin);
+            }
+            let covered = self.distance_in(end);
+            if covered > distance {
+                // About the second power of the time is covered.
+                let share = sqrt(((distance - before) / (covered - before)).clamp(0.0, 1.0));
+                return Some(root_between(exact, begin, end, begin + (end - begin) * share));
+            }
             if covered >= distance - tie.tight {
-                let exact = |time: f64| {
-                    let shape = self.shape(time);
-                    let off = self.distance(&shape) - distance;
-                    let known = off.abs() <= self.tolerance(time, &shape) / 16.0;
-                    (if known { 0.0 } else { off }, self.slope(&shape))
-                };
-                return Some(if covered <= distance {
-                    mark
-                } else {
-                    root_between(exact, piece_start, mark)
-                });
+                return Some(end);
             }
-            if covered < before && before >= distance - tie.loose {
-                return Some(piece_start);
+            if covered > before {
+                (begin, before) = (end, covered);
             }
-            (piece_start, before) = (mark, covered);
         }
         if to > self.peak_time && self.joint.peak > 0.0 {
-            let begin = from.max(self.peak_time);
-            let time = begin + (distance - self.distance_in(begin)).max(0.0) / self.joint.peak;
+            let cruise = from.max(self.peak_time);
+            let time = cruise + (distance - self.distance_in(cruise)).max(0.0) / self.joint.peak;
             if time <= to {
                 return Some(time);
             }
         }
-        (before >= distance - tie.loose).then_some(piece_start)
+        (before >= distance - tie.loose).then_some(begin)
+    }
+
+    /// The duration from which on P(T) is convex until the cruise begins: that at which the fall first
+    /// reaches from positive to negative accelerations. From there on `w` and `-x y` only grow.
+    fn convex_from(&self) -> f64 {
+        let (limit, c) = if self.c >= 0.0 { (self.joint.top, self.c) } else { (self.joint.bottom, -self.c) };
+        let s = if c <= limit * limit { sqrt(c) } else { (limit * limit + c) / (2.0 * limit) };
+        self.offset + 2.0 * self.mean * s
     }
 
     /// Marks every duration at which the formula or the sign of the slope of P changes.
     fn mark_pieces(&self, marks: &mut Marks) {
-        let Joint {
-            start: [v0, _],
-            end: [vf, _],
-            top,
-            bottom,
-            rise,
-            fall,
-            ..
-        } = self.joint;
+        let Joint { start: [v0, _], end: [vf, _], top, bottom, rise, fall, .. } = self.joint;
         let (mean, c, k_start, k_end) = (self.mean, self.c, self.k_start, self.k_end);
         if mean == 0.0 {
             marks.push(-v0 / top - vf / bottom);
@@ -437,10 +369,7 @@ impl Extremal {
             mark((both - c) / (2.0 * bottom));
             // Slope with both held: w = -beta A B / 2.
             let crest = -fall * top * bottom / 2.0;
-            mark(
-                ((crest - k_start) / top + (crest - k_end) / bottom) / (2.0 * mean)
-                    + (top + bottom) / 2.0,
-            );
+            mark(((crest - k_start) / top + (crest - k_end) / bottom) / (2.0 * mean) + (top + bottom) / 2.0);
         }
         // Slope without hold: (alpha + 2 beta) s^4 + 4 (K0 + Kf) s^2 + alpha c^2 = 0.
         for square in quadratic(rise + 2.0 * fall, 2.0 * (k_start + k_end), rise * c * c) {
@@ -463,21 +392,8 @@ impl Extremal {
 
     /// The constant-jerk parts of a shape, in order; some may have no duration.
     pub(crate) fn phases(&self, shape: &Shape) -> [Phase; 7] {
-        let Joint {
-            start: [v0, a0],
-            end: [_, af],
-            rise,
-            fall,
-            ..
-        } = self.joint;
-        let Shape {
-            high: x,
-            low: y,
-            crest,
-            hold_high,
-            cruise,
-            hold_low,
-        } = *shape;
+        let Joint { start: [v0, a0], end: [_, af], rise, fall, .. } = self.joint;
+        let Shape { high: x, low: y, crest, hold_high, cruise, hold_low } = *shape;
         let phase = |duration: f64, velocity: f64, acceleration: f64, slope: i8| Phase {
             duration,
             velocity,
@@ -543,12 +459,7 @@ struct Marks {
 
 impl Marks {
     fn between(from: f64, to: f64) -> Self {
-        Marks {
-            times: [0.0; 16],
-            count: 0,
-            from,
-            to,
-        }
+        Marks { times: [0.0; 16], count: 0, from, to }
     }
 
     /// Keeps `time` if it lies inside; NaN does not.

@@ -31,12 +31,7 @@ impl<const N: usize> Generator<N> {
     /// As [`Trajectory::calculate`].
     pub fn new(input: &Input<N>) -> Result<Self, Error> {
         let trajectory = Trajectory::calculate(input)?;
-        Ok(Generator {
-            expected: *input,
-            trajectory,
-            cursor: Cursor::default(),
-            time: 0.0,
-        })
+        Ok(Generator { expected: *input, trajectory, cursor: Cursor::default(), time: 0.0 })
     }
 
     /// Goes on by `period` seconds.
@@ -58,11 +53,7 @@ impl<const N: usize> Generator<N> {
         self.time += period;
         let states = self.cursor.at(&self.trajectory, self.time);
         self.expected.start = states;
-        Ok(Step {
-            states,
-            finished: self.time >= self.trajectory.duration(),
-            calculated,
-        })
+        Ok(Step { states, finished: self.time >= self.trajectory.duration(), calculated })
     }
 
     /// The current trajectory.

@@ -53,6 +53,14 @@ pub struct Input<const N: usize> {
     /// How far from its target position a joint may end where more exactness would cost time, as when
     /// the start is measured with noise. 0 asks for the target to within rounding.
     pub tolerance: [f64; N],
+    /// Lowest and highest position each joint may take on the way. There is no way round them: a motion
+    /// that would pass one is [`Error::PositionLimit`]. Infinite for none.
+    pub position_min: [f64; N],
+    /// See `position_min`.
+    pub position_max: [f64; N],
+    /// Return to a velocity limit that the start exceeds without dipping below it: slower than the
+    /// fastest return, and what one wants after lowering a limit in motion.
+    pub soft_limits: [bool; N],
     /// The shortest duration wanted, in seconds; 0 for none.
     pub minimum_duration: f64,
     /// If above 0, durations are whole multiples of it, in seconds.
@@ -73,6 +81,9 @@ impl<const N: usize> Default for Input<N> {
             target: [State::default(); N],
             limits: [Limits::default(); N],
             tolerance: [0.0; N],
+            position_min: [f64::NEG_INFINITY; N],
+            position_max: [f64::INFINITY; N],
+            soft_limits: [false; N],
             minimum_duration: 0.0,
             duration_step: 0.0,
             enabled: [true; N],
@@ -90,6 +101,7 @@ pub(crate) struct JointInput {
     pub(crate) target: State,
     pub(crate) limits: Limits,
     pub(crate) tolerance: f64,
+    pub(crate) soft: bool,
 }
 
 impl<const N: usize> Input<N> {
@@ -100,37 +112,21 @@ impl<const N: usize> Input<N> {
             target: self.target[index],
             limits: self.limits[index],
             tolerance: self.tolerance[index].max(0.0),
+            soft: self.soft_limits[index],
         }
     }
 }
 
 /// The limits of one joint as the solver wants them, after a check.
 pub(crate) fn check(index: usize, input: &JointInput) -> Result<Joint, Error> {
-    let JointInput {
-        interface,
-        start,
-        target,
-        limits,
-        ..
-    } = input;
+    let JointInput { interface, start, target, limits, .. } = input;
     let interface = *interface;
     if !start.is_finite() || !target.is_finite() || !input.tolerance.is_finite() {
         return Err(Error::NotFinite { joint: index });
     }
-    let Limits {
-        velocity_min,
-        velocity_max,
-        acceleration_min,
-        acceleration_max,
-        jerk_min,
-        jerk_max,
-    } = *limits;
-    let velocities = velocity_min <= 0.0
-        && velocity_max >= 0.0
-        && velocity_min.is_finite()
-        && velocity_max.is_finite();
-    let signs =
-        acceleration_min < 0.0 && acceleration_max > 0.0 && jerk_min < 0.0 && jerk_max > 0.0;
+    let Limits { velocity_min, velocity_max, acceleration_min, acceleration_max, jerk_min, jerk_max } = *limits;
+    let velocities = velocity_min <= 0.0 && velocity_max >= 0.0 && velocity_min.is_finite() && velocity_max.is_finite();
+    let signs = acceleration_min < 0.0 && acceleration_max > 0.0 && jerk_min < 0.0 && jerk_max > 0.0;
     if !signs || (interface == Interface::Position && !velocities) {
         return Err(Error::Limits { joint: index });
     }
@@ -157,19 +153,9 @@ pub(crate) fn check(index: usize, input: &JointInput) -> Result<Joint, Error> {
     if over(a, acceleration_max) || over(-a, -acceleration_min) {
         return Err(Error::TargetAcceleration { joint: index });
     }
-    let before = if a < 0.0 {
-        v + joint.fall * a * a / 2.0
-    } else {
-        v
-    };
-    let after = if a > 0.0 {
-        v - joint.rise * a * a / 2.0
-    } else {
-        v
-    };
-    if interface == Interface::Position
-        && (over(before, velocity_max) || over(-after, -velocity_min))
-    {
+    let before = if a < 0.0 { v + joint.fall * a * a / 2.0 } else { v };
+    let after = if a > 0.0 { v - joint.rise * a * a / 2.0 } else { v };
+    if interface == Interface::Position && (over(before, velocity_max) || over(-after, -velocity_min)) {
         return Err(Error::TargetAcceleration { joint: index });
     }
     Ok(joint)

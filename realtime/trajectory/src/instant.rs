@@ -4,7 +4,7 @@
 //! into an acceleration off by 1e-8. So switching times carry their rounding along, and durations
 //! of segments, being differences of such times, are as exact as when they were computed.
 
-/// A time in seconds: the double nearest to it, and what is missing.
+/// A time in seconds: a double a few roundings from it, and what is missing.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Instant {
     pub(crate) time: f64,
@@ -22,20 +22,12 @@ impl Instant {
         let sum = self.time + duration;
         let part = sum - self.time;
         let error = (self.time - (sum - part)) + (duration - part);
-        let rest = self.rest + error;
-        let time = sum + rest;
-        Instant {
-            time,
-            rest: rest - (time - sum),
-        }
+        Instant { time: sum, rest: self.rest + error }
     }
 
     /// The same time with `time`, a rounding away, as its leading part.
     pub(crate) fn read_as(self, time: f64) -> Self {
-        Instant {
-            time,
-            rest: self.since(Instant::at(time)),
-        }
+        Instant { time, rest: self.since(Instant::at(time)) }
     }
 
     /// The time since `earlier`.

@@ -1,6 +1,7 @@
 //! The motion of one joint as it is stored and evaluated: constant-jerk segments.
 
 use crate::{
+    brake::STEPS_MAX,
     extremal::Phase,
     instant::Instant,
     state::{Limits, State},
@@ -9,7 +10,8 @@ use crate::{
 /// Room for a prefix, a mixture of two extremal motions of 7 phases, and the end state.
 ///
 /// Two motions of 7 phases have 12 switching times, hence 13 segments. A prefix of one step adds one.
-/// A prefix of two ends waiting at an acceleration limit, so one of the motions lacks its first phase.
+/// A prefix of two ends waiting at an acceleration limit, so one of the motions lacks its first phase;
+/// one of three ends at the velocity limit, where one of the motions begins with its cruise.
 pub(crate) const SEGMENTS_MAX: usize = 15;
 
 /// One constant-jerk segment of a joint's motion.
@@ -94,19 +96,12 @@ impl Profile {
     }
 
     /// Appends the steps of a prefix; returns its duration and the position it ends at.
-    pub(crate) fn prefix(&mut self, steps: &[Phase; 2], position: f64) -> (f64, f64) {
+    pub(crate) fn prefix(&mut self, steps: &[Phase; STEPS_MAX], position: f64) -> (f64, f64) {
         let (mut now, mut position) = (Instant::default(), position);
         for step in steps {
             if step.duration > 0.0 {
-                let state = State {
-                    position,
-                    velocity: step.velocity,
-                    acceleration: step.acceleration,
-                };
-                let slopes = Slopes {
-                    far: step.slope,
-                    near: step.slope,
-                };
+                let state = State { position, velocity: step.velocity, acceleration: step.acceleration };
+                let slopes = Slopes { far: step.slope, near: step.slope };
                 self.push(now, state, slopes);
                 position = state.advanced(step.duration, self.jerk(slopes)).position;
                 now = now.after(step.duration);
@@ -128,38 +123,29 @@ impl Profile {
         position: f64,
     ) -> (Instant, f64) {
         self.share = share;
-        let mut motions = [
-            Walk::new(far, 1, begin, time),
-            Walk::new(near, -1, begin, time),
-        ];
-        if share >= 1.0 {
-            motions[1] = motions[0];
+        let far = |sign| Walk::new(far, sign, begin, time);
+        let near = |sign| Walk::new(near, sign, begin, time);
+        let mut motions = if share >= 1.0 {
+            [far(1); 2]
         } else if share <= 0.0 {
-            motions[0] = motions[1];
-        }
+            [near(-1); 2]
+        } else {
+            [far(1), near(-1)]
+        };
         let (mut now, mut position) = (Instant::at(begin), position);
         // Each pass ends a phase of one of the motions: 14 at most.
         for _ in 0..14 {
             let [first, second] = &motions;
             let (a, b) = (first.end(), second.end());
-            let until = if first.ended() || (!second.ended() && b.since(a) < 0.0) {
-                b
-            } else {
-                a
-            };
+            let until = if first.ended() || (!second.ended() && b.since(a) < 0.0) { b } else { a };
             if first.ended() && second.ended() {
                 break;
             }
             let passed = until.since(now);
             if passed > 0.0 {
-                let slopes = Slopes {
-                    far: first.slope(),
-                    near: second.slope(),
-                };
-                let (a, b) = (
-                    first.state(now, |slope| self.jerk_of(slope)),
-                    second.state(now, |slope| self.jerk_of(slope)),
-                );
+                let slopes = Slopes { far: first.slope(), near: second.slope() };
+                let (a, b) =
+                    (first.state(now, |slope| self.jerk_of(slope)), second.state(now, |slope| self.jerk_of(slope)));
                 let state = State {
                     position,
                     velocity: share * a[0] + (1.0 - share) * b[0],
@@ -179,14 +165,7 @@ impl Profile {
 
     /// The motion `start + direction * self`, which ends with the velocity and acceleration of
     /// `target`, and in its position if that is `held`.
-    pub(crate) fn scaled(
-        &self,
-        direction: f64,
-        start: f64,
-        target: &State,
-        held: bool,
-        minimum: f64,
-    ) -> Self {
+    pub(crate) fn scaled(&self, direction: f64, start: f64, target: &State, held: bool, minimum: f64) -> Self {
         let mut scaled = *self;
         let count = self.count();
         for place in 0..count {
@@ -212,11 +191,7 @@ impl Profile {
     pub(crate) fn extent(&self, time: f64, least: f64) -> f64 {
         (0..self.count()).fold(least, |extent, place| {
             let size = self.positions[place].abs() + time * self.velocities[place].abs();
-            if size <= extent || extent.is_nan() {
-                extent
-            } else {
-                size
-            }
+            if size <= extent || extent.is_nan() { extent } else { size }
         })
     }
 
@@ -230,20 +205,21 @@ impl Profile {
     }
 
     fn jerk_of(&self, slope: i8) -> f64 {
-        match slope {
-            1 => self.jerk_rise,
-            -1 => self.jerk_fall,
-            _ => 0.0,
-        }
+        [self.jerk_fall, 0.0, self.jerk_rise, 0.0][(slope + 1) as usize & 3]
+    }
+
+    /// The jerk of segment `index`.
+    #[inline]
+    fn jerk_at(&self, index: usize) -> f64 {
+        let jerks = [0.0, self.jerk_rise, self.jerk_fall, 0.0];
+        let code = (self.codes >> (4 * index)) as usize;
+        let (far, near) = (jerks[code & 3], jerks[code >> 2 & 3]);
+        if far == near { far } else { self.share * far + (1.0 - self.share) * near }
     }
 
     fn jerk(&self, slopes: Slopes) -> f64 {
         let (far, near) = (self.jerk_of(slopes.far), self.jerk_of(slopes.near));
-        if slopes.far == slopes.near {
-            far
-        } else {
-            self.share * far + (1.0 - self.share) * near
-        }
+        if slopes.far == slopes.near { far } else { self.share * far + (1.0 - self.share) * near }
     }
 
     fn state(&self, index: usize) -> State {
@@ -255,10 +231,7 @@ impl Profile {
     }
 
     fn instant(&self, index: usize) -> Instant {
-        Instant {
-            time: self.times[index],
-            rest: f64::from(self.rests[index]),
-        }
+        Instant { time: self.times[index], rest: f64::from(self.rests[index]) }
     }
 
     /// Segment `index`, or `None` past the end state. The last one is the end state, with no jerk.
@@ -268,18 +241,9 @@ impl Profile {
             return None;
         }
         let next = index + 1;
-        let duration = if next < self.count() {
-            self.instant(next).since(self.instant(index))
-        } else {
-            f64::INFINITY
-        };
-        let jerk = self.jerk(Slopes::of(self.codes, index));
-        Some(Segment {
-            start_time: self.times[index],
-            duration,
-            start: self.state(index),
-            jerk,
-        })
+        let duration = if next < self.count() { self.instant(next).since(self.instant(index)) } else { f64::INFINITY };
+        let jerk = self.jerk_at(index);
+        Some(Segment { start_time: self.times[index], duration, start: self.state(index), jerk })
     }
 
     /// The segments in order, the end state last.
@@ -314,10 +278,7 @@ impl Profile {
             index += 1;
         }
         *segment = index as u8;
-        self.state(index).advanced(
-            time - self.times[index],
-            self.jerk(Slopes::of(self.codes, index)),
-        )
+        self.state(index).advanced(time - self.times[index], self.jerk_at(index))
     }
 
     /// The state at `time`; before the start, the start.
@@ -325,16 +286,9 @@ impl Profile {
     #[inline]
     pub fn at(&self, time: f64) -> State {
         let time = time.max(0.0);
-        let passed = self
-            .times
-            .iter()
-            .map(|&start| usize::from(start <= time))
-            .sum::<usize>();
+        let passed = self.times.iter().map(|&start| usize::from(start <= time)).sum::<usize>();
         let index = (passed.max(1) - 1).min(SEGMENTS_MAX - 1);
-        self.state(index).advanced(
-            time - self.times[index],
-            self.jerk(Slopes::of(self.codes, index)),
-        )
+        self.state(index).advanced(time - self.times[index], self.jerk_at(index))
     }
 }
 
@@ -353,15 +307,6 @@ impl Slopes {
             _ => 0,
         };
         code(self.far) | code(self.near) << 2
-    }
-
-    fn of(codes: u64, index: usize) -> Self {
-        let code = codes >> (4 * index);
-        let slope = |code: u64| (code & 1) as i8 - (code >> 1 & 1) as i8;
-        Slopes {
-            far: slope(code),
-            near: slope(code >> 2),
-        }
     }
 }
 
@@ -384,7 +329,6 @@ impl<'a> Walk<'a> {
     /// acceleration, where it does least harm: the phases before it are timed from the beginning, those
     /// after it from the end. Without such a phase the motion ends a rounding early or late.
     fn new(phases: &'a [Phase; 7], sign: i8, begin: f64, time: f64) -> Self {
-        let mut starts = [Instant::at(begin); 8];
         let (mut pivot, mut longest, mut last) = (7, 0.0, 0);
         for (index, phase) in phases.iter().enumerate() {
             if phase.slope == 0 && phase.duration > longest {
@@ -393,7 +337,10 @@ impl<'a> Walk<'a> {
             if phase.duration > 0.0 {
                 last = index;
             }
-            starts[index + 1] = starts[index].after(phase.duration.max(0.0));
+        }
+        let mut starts = [Instant::at(begin); 8];
+        for index in 0..pivot {
+            starts[index + 1] = starts[index].after(phases[index].duration.max(0.0));
         }
         if pivot < 7 {
             starts[7] = Instant::at(begin + time);
@@ -401,13 +348,7 @@ impl<'a> Walk<'a> {
                 starts[index] = starts[index + 1].after(-phases[index].duration.max(0.0));
             }
         }
-        let mut walk = Walk {
-            phases,
-            index: 0,
-            starts,
-            last,
-            sign,
-        };
+        let mut walk = Walk { phases, index: 0, starts, last, sign };
         walk.pass(Instant::at(begin));
         walk
     }
@@ -423,9 +364,7 @@ impl<'a> Walk<'a> {
 
     /// How the acceleration changes, as seen with the signs of the joint.
     fn slope(&self) -> i8 {
-        self.phases
-            .get(self.index)
-            .map_or(0, |phase| self.sign * phase.slope)
+        self.phases.get(self.index).map_or(0, |phase| self.sign * phase.slope)
     }
 
     /// Moves on past every phase that has ended at `time`.
@@ -438,11 +377,7 @@ impl<'a> Walk<'a> {
     /// Velocity and acceleration at `now`, given the jerk of a slope; past the last phase, those at its
     /// end.
     fn state(&self, now: Instant, jerk: impl Fn(i8) -> f64) -> [f64; 2] {
-        let (index, now) = if self.ended() {
-            (self.last, self.starts[7])
-        } else {
-            (self.index.min(6), now)
-        };
+        let (index, now) = if self.ended() { (self.last, self.starts[7]) } else { (self.index.min(6), now) };
         let (phase, sign) = (&self.phases[index], f64::from(self.sign));
         let (velocity, acceleration) = (sign * phase.velocity, sign * phase.acceleration);
         let passed = now.since(self.starts[index]);
@@ -450,9 +385,6 @@ impl<'a> Walk<'a> {
             return [velocity, acceleration];
         }
         let jerk = jerk(self.sign * phase.slope);
-        [
-            velocity + passed * (acceleration + passed * jerk / 2.0),
-            acceleration + passed * jerk,
-        ]
+        [velocity + passed * (acceleration + passed * jerk / 2.0), acceleration + passed * jerk]
     }
 }

@@ -54,39 +54,23 @@ pub(crate) struct Mixture {
 
 impl Reach {
     /// `distance` is known to within `rounding`, and `allowed` off it is near enough; `velocity_min` is the lowest velocity of the joint.
-    pub(crate) fn new(
-        joint: Joint,
-        velocity_min: f64,
-        distance: f64,
-        rounding: f64,
-        allowed: f64,
-    ) -> Self {
+    pub(crate) fn new(joint: Joint, velocity_min: f64, distance: f64, rounding: f64, allowed: f64) -> Self {
         let velocities = joint.start[0].abs() + joint.end[0].abs();
         let near = joint.mirrored(-velocity_min);
         let (far, near) = (Extremal::new(joint), Extremal::new(near));
         let swing = Swing::of(&joint);
-        let arrival = swing
-            .straight(velocities, joint.peak.max(-velocity_min))
-            .filter(|time| {
-                let off = distance - swing.straight_distance(*time, joint.start[0]);
-                let rounding = rounding + far.distance_known(*time).1;
-                let tie = Tie::new(rounding, allowed);
-                let bend = (joint.end[1] - joint.start[1]).abs() * time * time;
-                let run = (joint.start[0].abs() + joint.end[0].abs()) * time;
-                let work = (ARRIVAL_SHARE * bend).max(ARRIVAL_RUN * run);
-                off.abs() <= tie.tight + ROUNDINGS * rounding + tie.loose.min(work)
-            });
+        let arrival = swing.straight(velocities, joint.peak.max(-velocity_min)).filter(|time| {
+            let off = distance - swing.straight_distance(*time, joint.start[0]);
+            let rounding = rounding + far.distance_known(*time).1;
+            let tie = Tie::new(rounding, allowed);
+            let bend = (joint.end[1] - joint.start[1]).abs() * time * time;
+            let run = (joint.start[0].abs() + joint.end[0].abs()) * time;
+            let work = (ARRIVAL_SHARE * bend).max(ARRIVAL_RUN * run);
+            off.abs() <= tie.tight + ROUNDINGS * rounding + tie.loose.min(work)
+        });
         let durations = swing.durations(velocities);
         let arrival = arrival.unwrap_or(-1.0);
-        Reach {
-            far,
-            near,
-            durations,
-            distance,
-            rounding,
-            allowed,
-            arrival,
-        }
+        Reach { far, near, durations, distance, rounding, allowed, arrival }
     }
 
     /// How long the rest takes, if one jerk does it up to roundings.
@@ -134,9 +118,14 @@ impl Reach {
 
     /// The motion that takes `time`, which must be a possible duration.
     pub(crate) fn mixture(&self, time: f64) -> Mixture {
-        let (far, near) = (self.far.shape(time), self.near.shape(time));
-        let (high, low) = (self.far.distance(&far), -self.near.distance(&near));
-        let share = if self.distance >= high || high <= low {
+        let far = self.far.shape(time);
+        let high = self.far.distance(&far);
+        if self.distance >= high {
+            return Mixture { far, near: far, share: 1.0 };
+        }
+        let near = self.near.shape(time);
+        let low = -self.near.distance(&near);
+        let share = if high <= low {
             1.0
         } else if self.distance <= low {
             0.0
@@ -150,10 +139,8 @@ impl Reach {
 impl Mixture {
     /// The phases of the two motions, the nearest one with its signs turned, and the share of the first.
     pub(crate) fn phases(&self, reach: &Reach) -> ([Phase; 7], [Phase; 7], f64) {
-        (
-            reach.far.phases(&self.far),
-            reach.near.phases(&self.near),
-            self.share,
-        )
+        let far = reach.far.phases(&self.far);
+        let near = if self.share >= 1.0 { far } else { reach.near.phases(&self.near) };
+        (far, near, self.share)
     }
 }

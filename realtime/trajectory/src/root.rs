@@ -3,17 +3,13 @@
 /// Halvings that bring any bracket of doubles to neighbours, plus the Newton steps between them.
 const STEPS_MAX: usize = 2200;
 
-/// The root of an increasing function with `f(low) < 0 < f(high)`, given with its slope.
+/// The root of a function with `f(low) < 0 < f(high)` and no other one, given with its slope and a
+/// first guess.
 ///
 /// Newton's step when it stays inside the bracket and the bracket keeps shrinking, else the middle.
 /// Every second step at most is wasted, so the loop ends within `STEPS_MAX`; three to eight steps
 /// are usual.
-pub(crate) fn root_between(
-    function: impl Fn(f64) -> (f64, f64),
-    mut low: f64,
-    mut high: f64,
-) -> f64 {
-    let mut guess = low + (high - low) / 2.0;
+pub(crate) fn root_between(function: impl Fn(f64) -> (f64, f64), mut low: f64, mut high: f64, mut guess: f64) -> f64 {
     let mut last_step = high - low;
     for _ in 0..STEPS_MAX {
         let (value, slope) = function(guess);

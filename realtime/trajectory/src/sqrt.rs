@@ -66,24 +66,13 @@ mod tests {
     fn the_portable_root_equals_the_instruction() {
         let mut bits = 0x3ff0_0000_0000_0001_u64;
         for _ in 0..20_000 {
-            bits = bits
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             let x = f64::from_bits(bits & !(1 << 63));
             if x.is_finite() {
                 assert_eq!(digits(x).to_bits(), sqrt(x).to_bits(), "{x:e}");
             }
         }
-        for x in [
-            0.0,
-            1.0,
-            2.0,
-            4.0,
-            5e-324,
-            f64::MIN_POSITIVE,
-            f64::MAX,
-            f64::INFINITY,
-        ] {
+        for x in [0.0, 1.0, 2.0, 4.0, 5e-324, f64::MIN_POSITIVE, f64::MAX, f64::INFINITY] {
             assert_eq!(digits(x).to_bits(), sqrt(x).to_bits(), "{x:e}");
         }
         assert!(digits(-1.0).is_nan() && sqrt(-1.0).is_nan());

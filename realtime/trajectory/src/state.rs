@@ -19,11 +19,7 @@ impl State {
     /// A joint standing still at `position`.
     #[must_use]
     pub const fn at_rest(position: f64) -> Self {
-        Self {
-            position,
-            velocity: 0.0,
-            acceleration: 0.0,
-        }
+        Self { position, velocity: 0.0, acceleration: 0.0 }
     }
 
     pub(crate) fn is_finite(&self) -> bool {
@@ -34,14 +30,9 @@ impl State {
     #[must_use]
     #[inline]
     pub fn advanced(&self, time: f64, jerk: f64) -> Self {
-        let State {
-            position,
-            velocity,
-            acceleration,
-        } = *self;
+        let State { position, velocity, acceleration } = *self;
         State {
-            position: position
-                + time * (velocity + time * (acceleration / 2.0 + time * jerk / 6.0)),
+            position: position + time * (velocity + time * (acceleration / 2.0 + time * jerk / 6.0)),
             velocity: velocity + time * (acceleration + time * jerk / 2.0),
             acceleration: acceleration + time * jerk,
         }

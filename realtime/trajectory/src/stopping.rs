@@ -33,12 +33,7 @@ impl Stopping {
         let extrema = profile.extrema();
         let duration = trajectory.duration();
         let position = profile.at(duration).position;
-        Ok(Stopping {
-            duration,
-            position,
-            lowest: extrema.lowest.position,
-            highest: extrema.highest.position,
-        })
+        Ok(Stopping { duration, position, lowest: extrema.lowest.position, highest: extrema.highest.position })
     }
 
     /// Distance covered from `start`, signed.

@@ -83,48 +83,18 @@ impl<const N: usize> Line<N> {
             }
         }
         let own = input.joint(leader);
-        let start = State {
-            position: 0.0,
-            ..own.start
-        };
-        let target = State {
-            position: quantities[0][leader],
-            ..own.target
-        };
-        let task = Task::new(
-            leader,
-            &JointInput {
-                start,
-                target,
-                limits,
-                ..own
-            },
-        )?;
-        Ok(Line {
-            task,
-            leader,
-            direction,
-        })
+        let start = State { position: 0.0, ..own.start };
+        let target = State { position: quantities[0][leader], ..own.target };
+        let task = Task::new(leader, &JointInput { start, target, limits, ..own })?;
+        Ok(Line { task, leader, direction })
     }
 
     /// The motion of joint `index`, given that of the line coordinate, unless it leaves the range of
     /// doubles.
-    pub(crate) fn profile(
-        &self,
-        index: usize,
-        line: &Profile,
-        input: &Input<N>,
-        minimum: f64,
-    ) -> Option<Profile> {
+    pub(crate) fn profile(&self, index: usize, line: &Profile, input: &Input<N>, minimum: f64) -> Option<Profile> {
         let held = input.interface[index] == Interface::Position;
         let start = input.start[index].position;
-        let profile = line.scaled(
-            self.direction[index],
-            start,
-            &input.target[index],
-            held,
-            minimum,
-        );
+        let profile = line.scaled(self.direction[index], start, &input.target[index], held, minimum);
         profile.extent(0.0, 0.0).is_finite().then_some(profile)
     }
 }
@@ -132,29 +102,17 @@ impl<const N: usize> Line<N> {
 /// Narrows the limits of the line coordinate to what a joint with the share `direction` can do.
 fn tighten(limits: &mut Limits, own: &Limits, direction: f64) {
     let both = |low: f64, high: f64| {
-        if direction > 0.0 {
-            (low / direction, high / direction)
-        } else {
-            (high / direction, low / direction)
-        }
+        if direction > 0.0 { (low / direction, high / direction) } else { (high / direction, low / direction) }
     };
     let narrow = |low: &mut f64, high: &mut f64, own: (f64, f64)| {
         *low = low.max(own.0);
         *high = high.min(own.1);
     };
-    narrow(
-        &mut limits.velocity_min,
-        &mut limits.velocity_max,
-        both(own.velocity_min, own.velocity_max),
-    );
+    narrow(&mut limits.velocity_min, &mut limits.velocity_max, both(own.velocity_min, own.velocity_max));
     narrow(
         &mut limits.acceleration_min,
         &mut limits.acceleration_max,
         both(own.acceleration_min, own.acceleration_max),
     );
-    narrow(
-        &mut limits.jerk_min,
-        &mut limits.jerk_max,
-        both(own.jerk_min, own.jerk_max),
-    );
+    narrow(&mut limits.jerk_min, &mut limits.jerk_max, both(own.jerk_min, own.jerk_max));
 }

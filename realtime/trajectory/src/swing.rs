@@ -70,84 +70,36 @@ impl Durations {
     /// The first possible duration not below `time`.
     pub(crate) fn next(&self, time: f64) -> f64 {
         let time = time.max(self.first);
-        if time > self.gap_start && time < self.gap_end {
-            self.gap_end
-        } else {
-            time
-        }
+        if time > self.gap_start && time < self.gap_end { self.gap_end } else { time }
     }
 
     /// The end of the connected part that holds `time`.
     pub(crate) fn end(&self, time: f64) -> f64 {
-        if time <= self.gap_start {
-            self.gap_start
-        } else {
-            f64::INFINITY
-        }
+        if time <= self.gap_start { self.gap_start } else { f64::INFINITY }
     }
 }
 
 impl Swing {
     pub(crate) fn of(joint: &Joint) -> Self {
-        let Joint {
-            start: [v0, a0],
-            end: [vf, af],
-            top,
-            bottom,
-            rise,
-            fall,
-            ..
-        } = *joint;
-        Swing {
-            start: a0,
-            end: af,
-            gain: vf - v0,
-            top,
-            bottom,
-            rise,
-            fall,
-        }
+        let Joint { start: [v0, a0], end: [vf, af], top, bottom, rise, fall, .. } = *joint;
+        Swing { start: a0, end: af, gain: vf - v0, top, bottom, rise, fall }
     }
 
     /// The possible durations of this swing. `velocity_scale` is the size of the velocities whose
     /// difference `gain` is, for the width of a tie.
     pub(crate) fn durations(&self, velocity_scale: f64) -> Durations {
-        let Swing {
-            start,
-            end,
-            gain,
-            top,
-            bottom,
-            rise,
-            fall,
-        } = *self;
+        let Swing { start, end, gain, top, bottom, rise, fall } = *self;
         let none = f64::INFINITY;
         if rise + fall == 0.0 {
-            let first = if gain >= 0.0 {
-                gain / top
-            } else {
-                -gain / bottom
-            };
-            return Durations {
-                first,
-                gap_start: none,
-                gap_end: none,
-            };
+            let first = if gain >= 0.0 { gain / top } else { -gain / bottom };
+            return Durations { first, gap_start: none, gap_end: none };
         }
         let (tip_time, tip_gain) = self.tip();
         let scale = velocity_scale + (rise + fall) * (start * start + end * end) / 2.0;
         let off = (gain - tip_gain).abs();
-        let jumps = if gain < tip_gain {
-            start.min(end) > 0.0
-        } else {
-            start.max(end) < 0.0
-        };
+        let jumps = if gain < tip_gain { start.min(end) > 0.0 } else { start.max(end) < 0.0 };
         if off <= TIE * scale || (jumps && off <= LOOSE_TIE * scale) {
-            let mut durations = Durations {
-                first: tip_time,
-                gap_start: none,
-                gap_end: none,
-            };
+            let mut durations = Durations { first: tip_time, gap_start: none, gap_end: none };
             if start.min(end) > 0.0 {
                 (durations.gap_start, durations.gap_end) = self.gap();
             } else if start.max(end) < 0.0 {
@@ -166,14 +118,7 @@ impl Swing {
     /// differs from the wanted one by no more than the roundings that a motion recomputed from its own
     /// output collects; `velocity_max` says how large its velocities have been.
     pub(crate) fn straight(&self, velocity_scale: f64, velocity_max: f64) -> Option<f64> {
-        let Swing {
-            start,
-            end,
-            gain,
-            rise,
-            fall,
-            ..
-        } = *self;
+        let Swing { start, end, gain, rise, fall, .. } = *self;
         let (time, tip_gain) = self.tip();
         let scale = velocity_scale + (rise + fall) * (start * start + end * end) / 2.0;
         let collected = (COLLECTED * velocity_max).min(ARRIVAL_SHARE * tip_gain.abs());
@@ -187,13 +132,7 @@ impl Swing {
 
     /// Duration and gain of one jerk straight from `start` to `end`.
     fn tip(&self) -> (f64, f64) {
-        let Swing {
-            start,
-            end,
-            rise,
-            fall,
-            ..
-        } = *self;
+        let Swing { start, end, rise, fall, .. } = *self;
         let squares = (end - start) * (end + start);
         if end >= start {
             (rise * (end - start), rise * squares / 2.0)
@@ -204,88 +143,35 @@ impl Swing {
 
     /// The motion that gains most velocity in `time`, and that gain.
     pub(crate) fn highest(&self, time: f64, velocity: f64) -> ([Phase; 7], f64) {
-        let Swing {
-            start,
-            end,
-            top,
-            rise,
-            fall,
-            ..
-        } = *self;
+        let Swing { start, end, top, rise, fall, .. } = *self;
         let mut phases = [Phase::default(); 7];
         if rise + fall == 0.0 {
-            phases[0] = Phase {
-                duration: time,
-                velocity,
-                acceleration: top,
-                slope: 0,
-            };
+            phases[0] = Phase { duration: time, velocity, acceleration: top, slope: 0 };
             return (phases, top * time);
         }
         let free = (time + rise * start + fall * end) / (rise + fall);
-        let (turn, hold) = if free > top {
-            (top, (free - top) * (rise + fall))
-        } else {
-            (free, 0.0)
-        };
+        let (turn, hold) = if free > top { (top, (free - top) * (rise + fall)) } else { (free, 0.0) };
         let climb = rise * (turn - start) * (turn + start) / 2.0;
-        phases[0] = Phase {
-            duration: rise * (turn - start),
-            velocity,
-            acceleration: start,
-            slope: 1,
-        };
-        phases[1] = Phase {
-            duration: hold,
-            velocity: velocity + climb,
-            acceleration: turn,
-            slope: 0,
-        };
+        phases[0] = Phase { duration: rise * (turn - start), velocity, acceleration: start, slope: 1 };
+        phases[1] = Phase { duration: hold, velocity: velocity + climb, acceleration: turn, slope: 0 };
         phases[2] = Phase {
             duration: fall * (turn - end),
             velocity: velocity + climb + hold * turn,
             acceleration: turn,
             slope: -1,
         };
-        (
-            phases,
-            climb + hold * turn + fall * (turn - end) * (turn + end) / 2.0,
-        )
+        (phases, climb + hold * turn + fall * (turn - end) * (turn + end) / 2.0)
     }
 
     /// The same swing with every sign turned.
     pub(crate) fn mirrored(&self) -> Self {
-        let Swing {
-            start,
-            end,
-            gain,
-            top,
-            bottom,
-            rise,
-            fall,
-        } = *self;
-        Swing {
-            start: -start,
-            end: -end,
-            gain: -gain,
-            top: bottom,
-            bottom: top,
-            rise: fall,
-            fall: rise,
-        }
+        let Swing { start, end, gain, top, bottom, rise, fall } = *self;
+        Swing { start: -start, end: -end, gain: -gain, top: bottom, bottom: top, rise: fall, fall: rise }
     }
 
     /// Durations when the gain lies above that of the tip: `high` gives the first, `low` the gap.
     fn above(&self) -> Durations {
-        let Swing {
-            start,
-            end,
-            gain,
-            top,
-            rise,
-            fall,
-            ..
-        } = *self;
+        let Swing { start, end, gain, top, rise, fall, .. } = *self;
         let turn = sqrt((2.0 * gain + rise * start * start + fall * end * end) / (rise + fall));
         let first = if turn <= top {
             rise * (turn - start) + fall * (turn - end)
@@ -293,29 +179,13 @@ impl Swing {
             let ramps = (rise * (top * top - start * start) + fall * (top * top - end * end)) / 2.0;
             rise * (top - start) + fall * (top - end) + (gain - ramps) / top
         };
-        let (gap_start, gap_end) = if start > 0.0 && end > 0.0 {
-            self.gap()
-        } else {
-            (f64::INFINITY, f64::INFINITY)
-        };
-        Durations {
-            first: first.max(0.0),
-            gap_start: gap_start.max(first),
-            gap_end,
-        }
+        let (gap_start, gap_end) = if start > 0.0 && end > 0.0 { self.gap() } else { (f64::INFINITY, f64::INFINITY) };
+        Durations { first: first.max(0.0), gap_start: gap_start.max(first), gap_end }
     }
 
     /// Where `low` exceeds the gain, for positive accelerations at both ends.
     fn gap(&self) -> (f64, f64) {
-        let Swing {
-            start,
-            end,
-            gain,
-            bottom,
-            rise,
-            fall,
-            ..
-        } = *self;
+        let Swing { start, end, gain, bottom, rise, fall, .. } = *self;
         let squared = (fall * start * start + rise * end * end - 2.0 * gain) / (rise + fall);
         if squared <= 0.0 || squared.is_nan() {
             return (f64::INFINITY, f64::INFINITY);
@@ -325,9 +195,7 @@ impl Swing {
         let gap_end = if turn <= bottom {
             middle + (rise + fall) * turn
         } else {
-            let ramps = (fall * (start * start - bottom * bottom)
-                + rise * (end * end - bottom * bottom))
-                / 2.0;
+            let ramps = (fall * (start * start - bottom * bottom) + rise * (end * end - bottom * bottom)) / 2.0;
             middle + (rise + fall) * bottom + (ramps - gain) / bottom
         };
         (middle - (rise + fall) * turn, gap_end)

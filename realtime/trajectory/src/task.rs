@@ -47,25 +47,13 @@ enum Goal {
 impl Task {
     pub(crate) fn new(index: usize, input: &JointInput) -> Result<Self, Error> {
         let joint = input::check(index, input)?;
-        let JointInput {
-            interface,
-            start,
-            target,
-            limits,
-            tolerance,
-        } = input;
+        let JointInput { interface, start, target, limits, tolerance, .. } = input;
         let rounding = POSITION_TIE * (start.position.abs() + target.position.abs());
         let reach = |joint: Joint, position: f64| {
-            Reach::new(
-                joint,
-                limits.velocity_min,
-                target.position - position,
-                rounding,
-                *tolerance,
-            )
+            Reach::new(joint, limits.velocity_min, target.position - position, rounding, *tolerance)
         };
         let brake = match interface {
-            Interface::Position => brake::prefix(&joint, limits.velocity_min),
+            Interface::Position => brake::prefix(&joint, limits.velocity_min, input.soft),
             Interface::Velocity => brake::acceleration_prefix(&joint),
         };
         let mut direct = None;
@@ -74,34 +62,17 @@ impl Task {
             direct = reach.arrival().map(|duration| (reach, duration));
         }
         let (begin, position) = Profile::empty(limits).prefix(&brake.steps, start.position);
-        let joint = Joint {
-            start: brake.end,
-            ..joint
-        };
+        let joint = Joint { start: brake.end, ..joint };
         let goal = match interface {
             Interface::Position => Goal::Position(reach(joint, position)),
             Interface::Velocity => {
                 let swing = Swing::of(&joint);
-                Goal::Velocity(
-                    swing,
-                    swing.durations(joint.start[0].abs() + joint.end[0].abs()),
-                )
+                Goal::Velocity(swing, swing.durations(joint.start[0].abs() + joint.end[0].abs()))
             }
         };
-        let mut task = Task {
-            goal,
-            direct,
-            brake,
-            input: *input,
-            begin,
-            minimum: 0.0,
-        };
+        let mut task = Task { goal, direct, brake, input: *input, begin, minimum: 0.0 };
         task.minimum = task.next(0.0).ok_or(Error::Unreachable { joint: index })?;
-        if task.minimum.is_finite() {
-            Ok(task)
-        } else {
-            Err(Error::OutOfRange { joint: index })
-        }
+        if task.minimum.is_finite() { Ok(task) } else { Err(Error::OutOfRange { joint: index }) }
     }
 
     /// The first possible duration not below `time`; `time` itself unchanged if it is possible.
@@ -114,18 +85,12 @@ impl Task {
             Goal::Position(reach) => reach.next(passed)?,
             Goal::Velocity(_, durations) => durations.next(passed),
         };
-        Some(if found <= passed {
-            time.max(self.begin)
-        } else {
-            self.begin + found
-        })
+        Some(if found <= passed { time.max(self.begin) } else { self.begin + found })
     }
 
     /// The motion without a prefix, if it takes no less than `time`.
     fn direct(&self, time: f64) -> Option<&(Reach, f64)> {
-        self.direct
-            .as_ref()
-            .filter(|(_, duration)| time <= duration * (1.0 + DIRECT_TIE))
+        self.direct.as_ref().filter(|(_, duration)| time <= duration * (1.0 + DIRECT_TIE))
     }
 
     /// The motion that takes `duration`, which must be possible, or `None` if the numbers left the
@@ -139,18 +104,12 @@ impl Task {
         }
         let time = duration - begin;
         let (far, near, share) = match (&self.goal, direct) {
-            (_, Some((reach, _))) | (Goal::Position(reach), None) => {
-                reach.mixture(time).phases(reach)
-            }
+            (_, Some((reach, _))) | (Goal::Position(reach), None) => reach.mixture(time).phases(reach),
             (Goal::Velocity(swing, _), None) => {
                 let velocity = self.brake.end[0];
                 let (far, high) = swing.highest(time, velocity);
                 let (near, low) = swing.mirrored().highest(time, -velocity);
-                let share = if high + low > 0.0 {
-                    ((swing.gain + low) / (high + low)).clamp(0.0, 1.0)
-                } else {
-                    1.0
-                };
+                let share = if high + low > 0.0 { ((swing.gain + low) / (high + low)).clamp(0.0, 1.0) } else { 1.0 };
                 (far, near, share)
             }
         };
@@ -158,17 +117,10 @@ impl Task {
         // The positions are integrated forward, so this tells whether all that led here was sound.
         let target = match self.goal {
             Goal::Position(_) => self.input.target,
-            Goal::Velocity(..) => State {
-                position,
-                ..self.input.target
-            },
+            Goal::Velocity(..) => State { position, ..self.input.target },
         };
-        let extent = profile.extent(
-            duration,
-            self.input.start.position.abs() + target.position.abs(),
-        );
-        let sound = extent.is_finite()
-            && (position - target.position).abs() <= SOUND * extent + self.input.tolerance;
+        let extent = profile.extent(duration, self.input.start.position.abs() + target.position.abs());
+        let sound = extent.is_finite() && (position - target.position).abs() <= SOUND * extent + self.input.tolerance;
         profile.finish(end.read_as(duration), target);
         profile.set_minimum(self.minimum);
         sound.then_some(profile)

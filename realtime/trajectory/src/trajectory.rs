@@ -39,7 +39,17 @@ impl<const N: usize> Trajectory<N> {
     /// # Realtime
     /// No allocation; at most `2 + 3 N` passes over the joints, each of bounded work.
     pub fn calculate(input: &Input<N>) -> Result<Self, Error> {
-        Plan::new(input)?.trajectory(input)
+        let trajectory = Plan::new(input)?.trajectory(input)?;
+        for (index, profile) in trajectory.profiles.iter().enumerate() {
+            let (low, high) = (input.position_min[index], input.position_max[index]);
+            if input.enabled[index] && (low > f64::NEG_INFINITY || high < f64::INFINITY) {
+                let extrema = profile.extrema();
+                if extrema.lowest.position < low || extrema.highest.position > high {
+                    return Err(Error::PositionLimit { joint: index });
+                }
+            }
+        }
+        Ok(trajectory)
     }
 
     /// The fastest stop of each joint, whatever the others do. Velocity limits play no part: braking
@@ -98,13 +108,7 @@ struct Plan<const N: usize> {
 
 impl<const N: usize> Plan<N> {
     fn new(input: &Input<N>) -> Result<Self, Error> {
-        let mut plan = Plan {
-            tasks: [None; N],
-            line: None,
-            on_line: [false; N],
-            shared: [false; N],
-            duration: 0.0,
-        };
+        let mut plan = Plan { tasks: [None; N], line: None, on_line: [false; N], shared: [false; N], duration: 0.0 };
         let (mut phase, mut strict) = (false, false);
         for index in 0..N {
             if !input.enabled[index] {
@@ -140,9 +144,7 @@ impl<const N: usize> Plan<N> {
                 let apart = plan.duration;
                 plan.line = Some(line);
                 match plan.shared_duration(input) {
-                    Ok(straight) if straight <= apart * (1.0 + STRAIGHT_TIE) => {
-                        plan.duration = straight
-                    }
+                    Ok(straight) if straight <= apart * (1.0 + STRAIGHT_TIE) => plan.duration = straight,
                     _ => plan.line = None,
                 }
             }
@@ -153,13 +155,7 @@ impl<const N: usize> Plan<N> {
     /// The joint with the longest minimum duration.
     fn last(&self) -> usize {
         let minimum = |index: usize| self.tasks[index].as_ref().map_or(0.0, |task| task.minimum);
-        (0..N).fold(0, |last, index| {
-            if minimum(index) > minimum(last) {
-                index
-            } else {
-                last
-            }
-        })
+        (0..N).fold(0, |last, index| if minimum(index) > minimum(last) { index } else { last })
     }
 
     /// The tasks that share a duration: the line, and the joints not on it.
@@ -167,68 +163,44 @@ impl<const N: usize> Plan<N> {
         let line = self.line.as_ref().map(|line| (0, &line.task));
         let alone = self.tasks.iter().enumerate().filter_map(|(index, task)| {
             let apart = self.shared[index] && !(self.line.is_some() && self.on_line[index]);
-            if apart {
-                task.as_ref().map(|task| (index, task))
-            } else {
-                None
-            }
+            if apart { task.as_ref().map(|task| (index, task)) } else { None }
         });
         line.into_iter().chain(alone)
     }
 
     fn shared_duration(&self, input: &Input<N>) -> Result<f64, Error> {
-        let first = self
-            .sharing()
-            .fold(0.0_f64, |longest, (_, task)| longest.max(task.minimum));
+        let first = self.sharing().fold(0.0_f64, |longest, (_, task)| longest.max(task.minimum));
         if self.sharing().next().is_none() {
             return Ok(0.0);
         }
         let next = |time: f64| {
             let mut duration = time;
             for (index, task) in self.sharing() {
-                duration = task
-                    .next(duration)
-                    .ok_or(Error::Unreachable { joint: index })?;
+                duration = task.next(duration).ok_or(Error::Unreachable { joint: index })?;
             }
             Ok(duration)
         };
-        possible(
-            first.max(input.minimum_duration),
-            input.duration_step,
-            2 + 3 * N,
-            next,
-        )
+        possible(first.max(input.minimum_duration), input.duration_step, 2 + 3 * N, next)
     }
 
     fn trajectory(&self, input: &Input<N>) -> Result<Trajectory<N>, Error> {
-        let mut trajectory = Trajectory {
-            profiles: [Profile::drifting(State::default()); N],
-            duration: self.duration,
-        };
+        let mut trajectory = Trajectory { profiles: [Profile::drifting(State::default()); N], duration: self.duration };
         let line = match &self.line {
-            Some(line) => Some((
-                line,
-                line.task
-                    .profile(self.duration)
-                    .ok_or(Error::OutOfRange { joint: line.leader })?,
-            )),
+            Some(line) => {
+                Some((line, line.task.profile(self.duration).ok_or(Error::OutOfRange { joint: line.leader })?))
+            }
             None => None,
         };
         for (index, profile) in trajectory.profiles.iter_mut().enumerate() {
             *profile = match (&self.tasks[index], &line) {
                 (None, _) => Profile::drifting(input.start[index]),
-                (Some(task), Some((line, along))) if self.on_line[index] => line
-                    .profile(index, along, input, task.minimum)
-                    .ok_or(Error::OutOfRange { joint: index })?,
+                (Some(task), Some((line, along))) if self.on_line[index] => {
+                    line.profile(index, along, input, task.minimum).ok_or(Error::OutOfRange { joint: index })?
+                }
                 (Some(task), _) => {
-                    let duration = if self.shared[index] {
-                        self.duration
-                    } else {
-                        own_duration(task, input, index)?
-                    };
+                    let duration = if self.shared[index] { self.duration } else { own_duration(task, input, index)? };
                     trajectory.duration = trajectory.duration.max(duration);
-                    task.profile(duration)
-                        .ok_or(Error::OutOfRange { joint: index })?
+                    task.profile(duration).ok_or(Error::OutOfRange { joint: index })?
                 }
             };
         }
@@ -239,29 +211,18 @@ impl<const N: usize> Plan<N> {
 /// The first possible duration of a joint that shares none.
 fn own_duration<const N: usize>(task: &Task, input: &Input<N>, index: usize) -> Result<f64, Error> {
     let next = |time: f64| task.next(time).ok_or(Error::Unreachable { joint: index });
-    possible(
-        task.minimum.max(input.minimum_duration),
-        input.duration_step,
-        5,
-        next,
-    )
+    possible(task.minimum.max(input.minimum_duration), input.duration_step, 5, next)
 }
 
 /// The first duration not below `time`, a multiple of `step` unless that is 0, that `next` leaves
 /// as it is; `next` moves a duration to the first one some joint can take.
-fn possible(
-    time: f64,
-    step: f64,
-    passes: usize,
-    next: impl Fn(f64) -> Result<f64, Error>,
-) -> Result<f64, Error> {
+fn possible(time: f64, step: f64, passes: usize, next: impl Fn(f64) -> Result<f64, Error>) -> Result<f64, Error> {
     let mut duration = next(time)?;
+    if step <= 0.0 && duration <= time {
+        return Ok(time);
+    }
     for _ in 0..passes {
-        let candidate = if step > 0.0 {
-            multiple(duration, step)
-        } else {
-            duration
-        };
+        let candidate = if step > 0.0 { multiple(duration, step) } else { duration };
         let found = next(candidate)?;
         if found <= candidate * (1.0 + STEP_TIE) {
             return Ok(candidate);
@@ -278,10 +239,6 @@ fn multiple(time: f64, step: f64) -> f64 {
         return time;
     }
     let whole = ratio as u64;
-    let count = if ratio - whole as f64 > STEP_TIE * ratio {
-        whole + 1
-    } else {
-        whole
-    };
+    let count = if ratio - whole as f64 > STEP_TIE * ratio { whole + 1 } else { whole };
     count as f64 * step
 }

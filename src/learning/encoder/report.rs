@@ -12,7 +12,7 @@ use crate::perception::card::Metrics;
 use crate::perception::fit::quantile;
 use crate::perception::model::softmax;
 use crate::perception::network::{Input, Network};
-use crate::perception::{Model, Perception, Recognised, Sampler};
+use crate::perception::{Model, Perception, Recognised, Sampler, WindingCard, class_of, fit, weigh_winding};
 
 /// What a network answers to a set of examples.
 pub(crate) struct Answers {
@@ -55,30 +55,73 @@ pub(crate) fn best(values: &[f32; FEATURE_CLASSES]) -> usize {
     (0..FEATURE_CLASSES).max_by(|&a, &b| values[a].total_cmp(&values[b]).then(b.cmp(&a))).unwrap_or(0)
 }
 
-/// The temperature with the least negative log-likelihood.
-pub(crate) fn temperature(answers: &Answers) -> f64 {
-    let cost = |t: f64| -> f64 {
-        let each = answers.logits.iter().zip(&answers.classes);
-        each.map(|(l, c)| -f64::from(softmax(l, t)[*c]).max(1e-9).ln()).sum()
-    };
-    let grid = (0..=120).map(|k| 0.2 * (20.0_f64).powf(f64::from(k) / 120.0));
-    grid.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(1.0)
+/// Share of sure answers that may be wrong.
+const WRONG_MAX: f64 = 0.025;
+
+/// What calibration decides.
+pub(crate) struct Calibration {
+    pub(crate) temperature: f64,
+    pub(crate) winding: WindingCard,
+    pub(crate) threshold: f64,
 }
 
-/// The smallest probability above which at most one answer in two hundred is wrong.
-pub(crate) fn threshold(answers: &Answers, temperature: f64) -> f64 {
-    let scored: Vec<(f64, bool)> = answers
-        .logits
+/// Calibrates on the validation split: the temperature and the weight of the winding with the
+/// least negative log-likelihood, then the smallest probability above which at most one
+/// answer in forty is wrong.
+pub(crate) fn calibrate(network: &Network, seed: u64, count: usize) -> Result<Calibration, TrainError> {
+    let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
+    let mut cases = Vec::with_capacity(count);
+    for index in 0..count as u64 {
+        let truth = example(seed, Split::Validation, index, &mut sampler, &mut cloud);
+        let output = network.forward(&Input::of(&[&truth.sample], 1, &Device::Cpu)?, None)?;
+        let row = output.class_logits.flatten_all()?.to_vec1::<f32>()?;
+        let logits: [f32; FEATURE_CLASSES] = std::array::from_fn(|c| row.get(c).copied().unwrap_or(f32::NAN));
+        let segment: Vec<bool> = output.segment_logits.to_vec1::<f32>()?.iter().map(|v| *v > 0.0).collect();
+        let Some(class) = class_of(&logits) else { continue };
+        let winding = fit(&cloud, &truth.sample, &segment, class).and_then(|fit| fit.winding);
+        cases.push((logits, class, winding, truth.class.code() as usize));
+    }
+    let weighed = |card: &WindingCard| -> Vec<([f32; FEATURE_CLASSES], usize)> {
+        let each = cases.iter().map(|(logits, class, winding, truth)| {
+            (winding.map_or(*logits, |w| weigh_winding(*logits, *class, w, card)), *truth)
+        });
+        each.collect()
+    };
+    let cost = |cases: &[([f32; FEATURE_CLASSES], usize)], t: f64| -> f64 {
+        cases.iter().map(|(l, c)| -f64::from(softmax(l, t)[*c]).max(1e-9).ln()).sum()
+    };
+    let mut best = (f64::MAX, WindingCard::default(), 1.0);
+    for gain in [0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0] {
+        for level in 1..12 {
+            let card = WindingCard { gain, level: 0.025 * f64::from(level) };
+            let cases = weighed(&card);
+            for step in 0..=40 {
+                let temperature = 0.2 * 20.0_f64.powf(f64::from(step) / 40.0);
+                let cost = cost(&cases, temperature);
+                if cost < best.0 {
+                    best = (cost, card, temperature);
+                }
+            }
+        }
+    }
+    let (_, winding, temperature) = best;
+    Ok(Calibration { temperature, winding, threshold: threshold(&weighed(&winding), temperature) })
+}
+
+fn threshold(cases: &[([f32; FEATURE_CLASSES], usize)], temperature: f64) -> f64 {
+    let scored: Vec<(f64, bool)> = cases
         .iter()
-        .zip(&answers.classes)
-        .map(|(l, c)| (f64::from(softmax(l, temperature)[best(l)]), best(l) == *c))
+        .map(|(logits, truth)| {
+            let top = best(logits);
+            (f64::from(softmax(logits, temperature)[top]), top == *truth)
+        })
         .collect();
     (40..=98)
         .map(|percent| f64::from(percent) / 100.0)
         .find(|limit| {
             let sure = scored.iter().filter(|(p, _)| p >= limit);
             let (count, wrong) = sure.fold((0, 0), |(n, w), (_, right)| (n + 1, w + u32::from(!right)));
-            f64::from(wrong) <= 0.005 * f64::from(count)
+            f64::from(wrong) <= WRONG_MAX * f64::from(count)
         })
         .unwrap_or(0.99)
 }

@@ -20,10 +20,10 @@ const SIZE: [f64; 2] = [0.004, 0.045];
 /// Tilt of the view off the feature's axis, radians.
 const TILT: [f64; 2] = [0.17, 0.70];
 /// Half the view in extents of the feature.
-const VIEW: [f64; 2] = [1.05, 2.3];
+const VIEW: [f64; 2] = [1.1, 2.1];
 /// Range noise in half widths of the view, and its limits in metres.
-const NOISE: [f64; 2] = [0.001, 0.010];
-const NOISE_LIMITS: [f64; 2] = [20e-6, 400e-6];
+const NOISE: [f64; 2] = [0.001, 0.006];
+const NOISE_LIMITS: [f64; 2] = [20e-6, 250e-6];
 
 /// A part, what lies around it, and how it is looked at.
 #[derive(Clone, Debug)]
@@ -72,7 +72,8 @@ impl Specimen {
         let focus = rng.random_range(0.25..0.5);
 
         // A part mostly stands on its carrier, feature up; now and then it lies on its side.
-        let lying = !matches!(body, Body::Tray { .. } | Body::Ring { .. }) && rng.random_bool(0.18);
+        let lying = !matches!(body, Body::Tray { .. } | Body::Ring { .. })
+            && rng.random_bool(if class == FeatureClass::Cone { 0.35 } else { 0.18 });
         let (feature_from_carrier, tilt, azimuth) = if lying {
             lying_on(&body, &part_from_feature, size, rng)
         } else {
@@ -232,16 +233,13 @@ fn body(feature: &mut FeatureGeometry, size: f64, room: [f64; 2], rng: &mut ChaC
                 (body, 0.5 * tall.max(least), [slide, half[1] - bar])
             }
         }
+        6..9 if feature.class == C::Cone => rod(feature, size, height, rng),
         6..8 => {
             let radius = widest * log_uniform([1.0, 5.0], rng);
             let off = (radius - widest) * rng.random::<f64>();
             (Body::Cylinder { radius, height }, top, [off, 0.0])
         }
-        8 if !sunk || (feature.class == C::Cone) => {
-            // The end of a rod or cable, thinner or thicker than the feature.
-            let radius = 0.5 * feature.diameter.max(0.6 * size) * rng.random_range(0.4..1.3);
-            (Body::Cylinder { radius, height: height.max(4.0 * radius) }, 0.5 * height.max(4.0 * radius), [0.0, 0.0])
-        }
+        8 if !sunk => rod(feature, size, height, rng),
         _ => {
             let bar = room[1] * rng.random_range(1.0..2.5);
             let inner = [0, 1].map(|_| size * rng.random_range(1.0..8.0));
@@ -250,6 +248,13 @@ fn body(feature: &mut FeatureGeometry, size: f64, room: [f64; 2], rng: &mut ChaC
             (Body::Ring { outer, inner, height }, top, [slide, 0.5 * inner[1] + bar])
         }
     }
+}
+
+/// The end of a rod or cable, thinner or thicker than the feature.
+fn rod(feature: &FeatureGeometry, size: f64, height: f64, rng: &mut ChaCha8Rng) -> (Body, f64, [f64; 2]) {
+    let radius = 0.5 * feature.diameter.max(0.6 * size) * rng.random_range(0.4..1.3);
+    let height = height.max(4.0 * radius);
+    (Body::Cylinder { radius, height }, 0.5 * height, [0.0, 0.0])
 }
 
 /// The carrier of a part that lies on its side, and a view from above it: carrier pose in the

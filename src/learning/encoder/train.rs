@@ -50,13 +50,13 @@ pub struct TrainOptions {
 /// How far a run is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum TrainProgress {
-    /// Scanning examples: made, of all.
+    /// Scanning examples of training and validation: made, of all.
     Data(usize, usize),
     /// In an epoch, counted from 1: steps done, steps of an epoch, mean loss so far.
     Step(usize, usize, usize, f64),
     /// An epoch is over: its number, accuracy and point accuracy on validation, clouds a second.
     Epoch(usize, f64, f64, f64),
-    /// Measuring on the test split.
+    /// Calibrating on the validation split, measuring on the test split.
     Test,
 }
 
@@ -104,7 +104,7 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&TrainProgress)) -
     std::fs::create_dir_all(&options.out).map_err(|source| TrainError::File { file: options.out.clone(), source })?;
     let counts = [options.samples, options.samples.div_ceil(10).max(64), options.samples.div_ceil(8).max(64)];
     let mut made = 0;
-    let total = counts.iter().sum();
+    let total = counts[0] + counts[1];
     let mut split = |split, count, progress: &mut dyn FnMut(&TrainProgress)| {
         let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
         let examples: Vec<Example> = (0..count as u64)
@@ -118,24 +118,22 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&TrainProgress)) -
             .collect();
         examples
     };
-    let training = split(Split::Train, counts[0], progress);
-    let validation = split(Split::Validation, counts[1], progress);
-
     let file = options.out.join(CHECKPOINT);
     let mut run = Run::begin(options, &file)?;
-    let steps = training.len() / BATCH;
-    while run.epoch < options.epochs {
-        run.epoch(&training, steps, options, progress)?;
-        let answers = Answers::of(&run.network, &validation)?;
-        let (accuracy, points) = (answers.accuracy(), answers.point_accuracy());
-        progress(&TrainProgress::Epoch(run.epoch, accuracy, points, run.clouds_a_second));
-        run.save(&file, options)?;
+    if run.epoch < options.epochs {
+        let training = split(Split::Train, counts[0], progress);
+        let validation = split(Split::Validation, counts[1], progress);
+        while run.epoch < options.epochs {
+            run.epoch(&training, training.len() / BATCH, options, progress)?;
+            let answers = Answers::of(&run.network, &validation)?;
+            let (accuracy, points) = (answers.accuracy(), answers.point_accuracy());
+            progress(&TrainProgress::Epoch(run.epoch, accuracy, points, run.clouds_a_second));
+            run.save(&file, options)?;
+        }
     }
 
-    let answers = Answers::of(&run.network, &validation)?;
-    let temperature = report::temperature(&answers);
-    let threshold = report::threshold(&answers, temperature);
     progress(&TrainProgress::Test);
+    let calibration = report::calibrate(&run.network, options.seed, counts[1])?;
     let weights: HashMap<String, Tensor> = run.weights()?.into_iter().collect();
     let weights_file = options.out.join(WEIGHTS_FILE);
     candle_core::safetensors::save(&weights, &weights_file)?;
@@ -154,8 +152,9 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&TrainProgress)) -
             test: counts[2],
             epochs: options.epochs,
         },
-        temperature,
-        threshold,
+        temperature: calibration.temperature,
+        threshold: calibration.threshold,
+        winding: calibration.winding,
         metrics: Metrics::default(),
     };
     card.write(&options.out.join(CARD_FILE))?;

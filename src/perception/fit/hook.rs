@@ -61,5 +61,5 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         ..FeatureDimensions::default()
     };
     let pose = frame.pose(Vector3::new(centre.x, centre.y, 0.0), Vector3::z(), Vector3::new(along.x, along.y, 0.0));
-    Some(Fit { camera_from_feature: pose, dimensions })
+    Some(Fit { camera_from_feature: pose, dimensions, winding: None })
 }

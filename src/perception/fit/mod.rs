@@ -37,6 +37,8 @@ pub struct Fit {
     pub camera_from_feature: Isometry3<f64>,
     /// Dimensions; zero where they do not apply or could not be told.
     pub dimensions: FeatureDimensions,
+    /// Of a hole or axis: the share of its wall's variance that a helix explains, 0 to 1.
+    pub winding: Option<f64>,
 }
 
 /// A dense point in the frame of the surface: x, y in it, z above it.
@@ -121,6 +123,7 @@ fn bare(plane: &Plane, dense: &Dense) -> Fit {
     Fit {
         camera_from_feature: frame.pose(Vector3::zeros(), Vector3::z(), Vector3::x()),
         dimensions: FeatureDimensions::default(),
+        winding: None,
     }
 }
 

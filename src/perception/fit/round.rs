@@ -257,16 +257,17 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
     let spacing = 2.0 * f64::from(sample.scale) / 100.0;
     let depth = measured((end - base).abs(), 0.3 * spacing + 0.01 * (end - base).abs());
 
+    let wound: Vec<[f64; 3]> = local
+        .iter()
+        .filter_map(|p| {
+            let (off, e) = wall.distance(p);
+            (e.abs() < 0.2 * wall.radius).then(|| [p.z, off.y.atan2(off.x), e])
+        })
+        .collect();
+    let winding = if class == FeatureClass::Cone { None } else { thread::pitch(&wound, wall.radius) };
     let (diameter, pitch) = match class {
         FeatureClass::ThreadedHole | FeatureClass::ThreadedAxis => {
-            let wound: Vec<[f64; 3]> = local
-                .iter()
-                .filter_map(|p| {
-                    let (off, e) = wall.distance(p);
-                    (e.abs() < 0.2 * wall.radius).then(|| [p.z, off.y.atan2(off.x), e])
-                })
-                .collect();
-            let pitch = thread::pitch(&wound, wall.radius);
+            let pitch = winding.map(|(pitch, _)| pitch).unwrap_or_default();
             // Crests hide much of the roots, so that the wall fitted lies nearer to them: in a
             // bore the major diameter is most of twice the profile's height outside, on an axis
             // a little of it. Shares measured on generated threads.
@@ -286,6 +287,7 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
     Fit {
         camera_from_feature: frame.pose(at, axis, Vector3::x()),
         dimensions: FeatureDimensions { diameter, depth, pitch, ..FeatureDimensions::default() },
+        winding: winding.map(|(_, share)| share),
     }
 }
 

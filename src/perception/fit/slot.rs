@@ -37,7 +37,8 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         let mid = Vector2::new(0.5 * (x0 + x1), 0.5 * (y0 + y1));
         let straight = (0.5 * (x1 - x0) - 0.7 * (y1 - y0)).max(0.2 * (x1 - x0));
         let beside: Vec<Vector2<f64>> = plate.iter().copied().filter(|p| (p.x - mid.x).abs() < straight).collect();
-        let edge_y = gap(beside.iter().map(|p| p.y), mid.y, y1 - y0).unwrap_or([y0, y1]);
+        // Without the surface on both sides it is no slot that could be measured.
+        let edge_y = gap(beside.iter().map(|p| p.y), mid.y, y1 - y0)?;
         if round < 2 {
             // Turn along the edges: slope of the gap's middle from one half to the other.
             let half = |sign: f64| {
@@ -83,7 +84,7 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         ..FeatureDimensions::default()
     };
     let pose = frame.pose(Vector3::new(centre.x, centre.y, 0.0), Vector3::z(), Vector3::new(along.x, along.y, 0.0));
-    Some(Fit { camera_from_feature: pose, dimensions })
+    Some(Fit { camera_from_feature: pose, dimensions, winding: None })
 }
 
 /// Direction of greatest spread, x positive.

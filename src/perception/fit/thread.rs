@@ -11,18 +11,19 @@ const FREQUENCIES: usize = 240;
 const POWER_MIN: f64 = 0.12;
 
 /// Pitch from points of a threaded wall: height along the axis, angle about it, and distance
-/// off the mean wall, metres and radians. Zero when no frequency stands out.
+/// off the mean wall, metres and radians; and the share of the wall's variance the helix
+/// explains. The pitch is zero when no frequency stands out; `None` when too little is seen.
 ///
 /// A right-handed thread of pitch p has the profile f(z/p − φ/2π), so the distances correlate
 /// with exp(i(2πz/p − φ)); the best of a range of frequencies is taken and interpolated.
-pub(crate) fn pitch(points: &[[f64; 3]], radius: f64) -> Measured {
-    if points.len() < 40 {
-        return Measured::default();
+pub(crate) fn pitch(points: &[[f64; 3]], radius: f64) -> Option<(Measured, f64)> {
+    if points.len() < 60 {
+        return None;
     }
     let mean = points.iter().map(|p| p[2]).sum::<f64>() / points.len() as f64;
     let power: f64 = points.iter().map(|p| (p[2] - mean).powi(2)).sum();
     if power <= 0.0 {
-        return Measured::default();
+        return None;
     }
     let (low, high) = (1.0 / (PITCH[1] * radius), 1.0 / (PITCH[0] * radius));
     let step = (high - low) / (FREQUENCIES - 1) as f64;
@@ -53,7 +54,7 @@ pub(crate) fn pitch(points: &[[f64; 3]], radius: f64) -> Measured {
         best
     };
     if share[best] < POWER_MIN || best == 0 || best == FREQUENCIES - 1 {
-        return Measured::default();
+        return Some((Measured::default(), share[best]));
     }
     // Vertex of the parabola through the peak and its neighbours.
     let (before, at, after) = (share[best - 1], share[best], share[best + 1]);
@@ -61,5 +62,5 @@ pub(crate) fn pitch(points: &[[f64; 3]], radius: f64) -> Measured {
     let shift = if bend < 0.0 { (0.5 * (before - after) / bend).clamp(-0.5, 0.5) } else { 0.0 };
     let frequency = low + step * (best as f64 + shift);
     let value = 1.0 / frequency;
-    Measured { value, sigma: (0.25 * step / frequency * value).max(0.005 * value) }
+    Some((Measured { value, sigma: (0.25 * step / frequency * value).max(0.005 * value) }, share[best]))
 }

@@ -33,11 +33,7 @@ pub(crate) struct JointCase {
 
 impl Case {
     pub(crate) fn input<const N: usize>(&self) -> Input<N> {
-        let mut input = Input {
-            minimum_duration: self.minimum,
-            duration_step: self.step,
-            ..Input::default()
-        };
+        let mut input = Input { minimum_duration: self.minimum, duration_step: self.step, ..Input::default() };
         for (index, joint) in self.joints.iter().enumerate() {
             input.start[index] = joint.start;
             input.target[index] = joint.target;
@@ -55,38 +51,23 @@ pub(crate) fn load() -> Vec<Case> {
     let columns: Vec<&str> = lines.next().expect("a header").split(',').collect();
     for line in lines {
         let fields: Vec<&str> = line.split(',').collect();
-        let text = |name: &str| {
-            fields[columns
-                .iter()
-                .position(|column| *column == name)
-                .expect(name)]
-        };
+        let text = |name: &str| fields[columns.iter().position(|column| *column == name).expect(name)];
         let number = |name: &str, default: f64| match text(name) {
             "" => default,
-            value => value
-                .parse::<f64>()
-                .unwrap_or_else(|_| panic!("{name} in {line}")),
+            value => value.parse::<f64>().unwrap_or_else(|_| panic!("{name} in {line}")),
         };
         if number("dof", 0.0) == 0.0 {
             cases.push(Case {
                 id: number("case", 0.0) as usize,
                 tag: text("tag").into(),
-                interface: if text("iface") == "1" {
-                    Interface::Velocity
-                } else {
-                    Interface::Position
-                },
+                interface: if text("iface") == "1" { Interface::Velocity } else { Interface::Position },
                 synchronization: match text("sync") {
                     "1" => Synchronization::TimeIfNecessary,
                     "2" => Synchronization::Phase,
                     "3" => Synchronization::None,
                     _ => Synchronization::Time,
                 },
-                step: if text("disc") == "1" {
-                    number("dt", 0.0)
-                } else {
-                    0.0
-                },
+                step: if text("disc") == "1" { number("dt", 0.0) } else { 0.0 },
                 minimum: number("min_dur", 0.0),
                 code: number("res_cpp", 0.0) as i32,
                 duration: number("t_sync", f64::NAN),
@@ -100,28 +81,20 @@ pub(crate) fn load() -> Vec<Case> {
             velocity: number(v, 0.0),
             acceleration: number(a, 0.0),
         };
-        let (v, a, j) = (
-            number("vmax", f64::NAN),
-            number("amax", f64::NAN),
-            number("jmax", f64::NAN),
-        );
+        let (v, a, j) = (number("vmax", f64::NAN), number("amax", f64::NAN), number("jmax", f64::NAN));
         let limits = Limits {
             velocity_min: number("vmin", -v),
             acceleration_min: number("amin", -a),
             ..Limits::symmetric(v, a, j)
         };
         let best = number("t_min_best", f64::NAN);
-        cases
-            .last_mut()
-            .expect("joint 0 comes first")
-            .joints
-            .push(JointCase {
-                start: state("p0", "v0", "a0"),
-                target: state("pf", "vf", "af"),
-                limits,
-                minimum: number("t_min", f64::NAN),
-                best: (!best.is_nan()).then_some(best),
-            });
+        cases.last_mut().expect("joint 0 comes first").joints.push(JointCase {
+            start: state("p0", "v0", "a0"),
+            target: state("pf", "vf", "af"),
+            limits,
+            minimum: number("t_min", f64::NAN),
+            best: (!best.is_nan()).then_some(best),
+        });
     }
     cases
 }

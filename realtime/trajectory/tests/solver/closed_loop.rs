@@ -12,12 +12,7 @@ struct Arrival {
 
 /// Recomputes every `cycle` seconds until the rest of the way takes less than one cycle, adding
 /// `noise` to each state.
-fn follow(
-    problem: &Problem,
-    cycle: f64,
-    tolerance: f64,
-    mut noise: impl FnMut() -> f64,
-) -> Arrival {
+fn follow(problem: &Problem, cycle: f64, tolerance: f64, mut noise: impl FnMut() -> f64) -> Arrival {
     let mut input = Input {
         start: [problem.start],
         target: [problem.target],
@@ -25,32 +20,18 @@ fn follow(
         tolerance: [tolerance],
         ..Input::default()
     };
-    let calculate = |input: &Input<1>| {
-        Trajectory::calculate(input).unwrap_or_else(|error| panic!("{error} {input:?}"))
-    };
+    let calculate = |input: &Input<1>| Trajectory::calculate(input).unwrap_or_else(|error| panic!("{error} {input:?}"));
     let mut trajectory = calculate(&input);
     let planned = trajectory.duration();
     let (mut cycles, most) = (0, (2.0 * planned / cycle) as u32 + 1000);
     while trajectory.duration() > cycle && cycles < most {
-        let [
-            State {
-                position,
-                velocity,
-                acceleration,
-            },
-        ] = trajectory.at(cycle);
-        input.start[0] = State {
-            position: position + noise(),
-            velocity: velocity + noise(),
-            acceleration: acceleration + noise(),
-        };
+        let [State { position, velocity, acceleration }] = trajectory.at(cycle);
+        input.start[0] =
+            State { position: position + noise(), velocity: velocity + noise(), acceleration: acceleration + noise() };
         cycles += 1;
         trajectory = calculate(&input);
     }
-    Arrival {
-        planned,
-        arrived: f64::from(cycles) * cycle + trajectory.duration(),
-    }
+    Arrival { planned, arrived: f64::from(cycles) * cycle + trajectory.duration() }
 }
 
 /// Without noise the loop arrives when the first trajectory said it would: within a microsecond, but
@@ -58,12 +39,7 @@ fn follow(
 /// position takes longer to correct (its cube root counts).
 #[test]
 fn a_closed_loop_arrives_as_planned() {
-    for kind in [
-        Kind::Benchmark,
-        Kind::Decimals(1),
-        Kind::Asymmetric,
-        Kind::Outside,
-    ] {
+    for kind in [Kind::Benchmark, Kind::Decimals(1), Kind::Asymmetric, Kind::Outside] {
         let mut source = Source::new(kind, 3);
         let (mut late, mut worst) = (0, 0.0_f64);
         for index in 0..150 {
@@ -72,10 +48,7 @@ fn a_closed_loop_arrives_as_planned() {
             let drift = (arrived - planned).abs();
             worst = worst.max(drift);
             late += u32::from(drift > 1e-6);
-            assert!(
-                drift < 1e-3,
-                "{kind:?} {index}: planned {planned} arrived {arrived} {problem:?}"
-            );
+            assert!(drift < 1e-3, "{kind:?} {index}: planned {planned} arrived {arrived} {problem:?}");
         }
         println!("{kind:?}: {late} of 150 by more than 1e-6 s, worst drift {worst:.1e} s");
         assert!(late <= 2, "{kind:?}: {late}");
@@ -90,8 +63,7 @@ fn a_closed_loop_arrives_as_planned() {
 fn a_noisy_closed_loop_arrives_in_spite_of_it() {
     let cycle = 4e-3;
     for size in [1e-12, 1e-9] {
-        let (mut source, mut noise) =
-            (Source::new(Kind::Benchmark, 4), Source::new(Kind::Noise, 5));
+        let (mut source, mut noise) = (Source::new(Kind::Benchmark, 4), Source::new(Kind::Noise, 5));
         let mut worst = 0.0_f64;
         for index in 0..150 {
             let mut problem = source.problem();
@@ -100,10 +72,7 @@ fn a_noisy_closed_loop_arrives_in_spite_of_it() {
             let late = (arrival.arrived - arrival.planned).abs();
             worst = worst.max(late);
             let allowed = cycle + 2.0 * (32.0 * 10.0 * size / problem.limits.jerk_max).cbrt();
-            assert!(
-                late <= allowed,
-                "{index}, noise {size:e}: late by {late}, allowed {allowed} {problem:?}"
-            );
+            assert!(late <= allowed, "{index}, noise {size:e}: late by {late}, allowed {allowed} {problem:?}");
         }
         println!("noise {size:e}: latest by {worst:.1e} s");
     }
@@ -120,23 +89,10 @@ fn an_idle_joint_stays() {
     assert_eq!(trajectory.duration(), 0.0);
     assert_eq!(trajectory.at(17.0), input.target);
     for _ in 0..20_000 {
-        let [
-            State {
-                position,
-                velocity,
-                acceleration,
-            },
-        ] = Trajectory::calculate(&input).expect("it is there").at(1e-3);
+        let [State { position, velocity, acceleration }] = Trajectory::calculate(&input).expect("it is there").at(1e-3);
         let mut shake = || noise.uniform(-1e-9, 1e-9);
-        input.start[0] = State {
-            position: position + shake(),
-            velocity: velocity + shake(),
-            acceleration: acceleration + shake(),
-        };
-        assert!(
-            (input.start[0].position - 0.3).abs() < 1e-7,
-            "{:?}",
-            input.start[0]
-        );
+        input.start[0] =
+            State { position: position + shake(), velocity: velocity + shake(), acceleration: acceleration + shake() };
+        assert!((input.start[0].position - 0.3).abs() < 1e-7, "{:?}", input.start[0]);
     }
 }

@@ -68,10 +68,7 @@ pub(crate) struct Source {
 
 impl Source {
     pub(crate) fn new(kind: Kind, seed: u64) -> Self {
-        Source {
-            generator: ChaCha8Rng::seed_from_u64(seed),
-            kind,
-        }
+        Source { generator: ChaCha8Rng::seed_from_u64(seed), kind }
     }
 
     pub(crate) fn bits(&mut self) -> u64 {
@@ -115,22 +112,14 @@ impl Source {
         match self.kind {
             Kind::Benchmark => self.benchmark(),
             Kind::Decimals(digits) => {
-                let Problem {
-                    start,
-                    target,
-                    limits,
-                } = self.benchmark();
+                let Problem { start, target, limits } = self.benchmark();
                 let round = |x: f64| (x * 10_f64.powi(digits)).round() / 10_f64.powi(digits);
                 let round_state = |s: State| State {
                     position: round(s.position),
                     velocity: round(s.velocity),
                     acceleration: round(s.acceleration),
                 };
-                let (v, a, j) = (
-                    limits.velocity_max,
-                    limits.acceleration_max,
-                    limits.jerk_max,
-                );
+                let (v, a, j) = (limits.velocity_max, limits.acceleration_max, limits.jerk_max);
                 let up = |x: f64| round(x + 10_f64.powi(-digits));
                 Problem {
                     start: round_state(start),
@@ -146,8 +135,7 @@ impl Source {
             }
             Kind::UnitLimits(digits) => {
                 let round = |x: f64| (x * 10_f64.powi(digits)).round() / 10_f64.powi(digits);
-                let state =
-                    [4.0, 1.0, 1.0, 4.0, 1.0, 1.0].map(|reach| round(self.uniform(-reach, reach)));
+                let state = [4.0, 1.0, 1.0, 4.0, 1.0, 1.0].map(|reach| round(self.uniform(-reach, reach)));
                 problem(state, [1.0; 3])
             }
             Kind::HighLimits => {
@@ -158,10 +146,7 @@ impl Source {
             }
             Kind::Asymmetric => {
                 let mut problem = self.benchmark();
-                let (v, a) = (
-                    problem.target.velocity.abs(),
-                    problem.target.acceleration.abs(),
-                );
+                let (v, a) = (problem.target.velocity.abs(), problem.target.acceleration.abs());
                 problem.limits.velocity_min = -self.uniform(0.08, 16.0) - v;
                 problem.limits.acceleration_min = -self.uniform(0.08, 16.0) - a;
                 problem.limits.jerk_min = -self.uniform(0.08, 16.0);
@@ -172,11 +157,7 @@ impl Source {
                 let mut problem = self.draw();
                 self.kind = Kind::Neighbours;
                 for state in [&mut problem.start, &mut problem.target] {
-                    for value in [
-                        &mut state.position,
-                        &mut state.velocity,
-                        &mut state.acceleration,
-                    ] {
+                    for value in [&mut state.position, &mut state.velocity, &mut state.acceleration] {
                         *value = match self.bits() % 3 {
                             0 => value.next_up(),
                             1 => value.next_down(),
@@ -204,24 +185,16 @@ impl Source {
                 let mut size = |low: f64, high: f64| 10_f64.powf(self.uniform(low, high));
                 let [v, a, j] = [size(-9.0, 12.0), size(-9.0, 12.0), size(-9.0, 12.0)];
                 let p = size(-9.0, 9.0);
-                let [p0, v0, a0, pf, vf, af] =
-                    [p, v, a, p, v, a].map(|size| size * self.uniform(-1.0, 1.0));
+                let [p0, v0, a0, pf, vf, af] = [p, v, a, p, v, a].map(|size| size * self.uniform(-1.0, 1.0));
                 let rest = if self.chance(0.5) { 0.0 } else { 1.0 };
-                problem(
-                    [p0, v0 * rest, a0 * rest, pf, vf * rest, af * rest],
-                    [v, a, j],
-                )
+                problem([p0, v0 * rest, a0 * rest, pf, vf * rest, af * rest], [v, a, j])
             }
             Kind::Infinite => {
                 let mut problem = self.benchmark();
                 let all = self.chance(0.3);
                 let (v, a) = (problem.limits.velocity_max, problem.limits.acceleration_max);
                 let a = if all { f64::INFINITY } else { a };
-                let j = if all || self.chance(0.5) {
-                    f64::INFINITY
-                } else {
-                    problem.limits.jerk_max
-                };
+                let j = if all || self.chance(0.5) { f64::INFINITY } else { problem.limits.jerk_max };
                 let a = if j.is_finite() { f64::INFINITY } else { a };
                 problem.limits = Limits::symmetric(v, a, j);
                 problem
@@ -238,61 +211,25 @@ impl Source {
     /// Section "Benchmark input" of ruckig's benchmark_target.cpp.
     fn benchmark(&mut self) -> Problem {
         let (vf, af) = (self.sometimes(0.7, 0.8), self.sometimes(0.6, 0.8));
-        let state = [
-            self.normal(4.0),
-            self.sometimes(0.9, 0.8),
-            self.sometimes(0.8, 0.8),
-            self.normal(4.0),
-            vf,
-            af,
-        ];
-        let limits = [
-            self.uniform(0.1, 12.0) + vf.abs(),
-            self.uniform(0.1, 12.0) + af.abs(),
-            self.uniform(0.1, 12.0),
-        ];
+        let state = [self.normal(4.0), self.sometimes(0.9, 0.8), self.sometimes(0.8, 0.8), self.normal(4.0), vf, af];
+        let limits = [self.uniform(0.1, 12.0) + vf.abs(), self.uniform(0.1, 12.0) + af.abs(), self.uniform(0.1, 12.0)];
         problem(state, limits)
     }
 }
 
 fn problem([p0, v0, a0, pf, vf, af]: [f64; 6], [v, a, j]: [f64; 3]) -> Problem {
     Problem {
-        start: State {
-            position: p0,
-            velocity: v0,
-            acceleration: a0,
-        },
-        target: State {
-            position: pf,
-            velocity: vf,
-            acceleration: af,
-        },
+        start: State { position: p0, velocity: v0, acceleration: a0 },
+        target: State { position: pf, velocity: vf, acceleration: af },
         limits: Limits::symmetric(v, a, j),
     }
 }
 
 /// Whether the target lies within the limits, and can be reached and left within them.
 fn reachable(problem: &Problem) -> bool {
-    let Problem {
-        target:
-            State {
-                velocity: v,
-                acceleration: a,
-                ..
-            },
-        limits,
-        ..
-    } = *problem;
-    let before = if a < 0.0 {
-        v + a * a / (-2.0 * limits.jerk_min)
-    } else {
-        v
-    };
-    let after = if a > 0.0 {
-        v - a * a / (2.0 * limits.jerk_max)
-    } else {
-        v
-    };
+    let Problem { target: State { velocity: v, acceleration: a, .. }, limits, .. } = *problem;
+    let before = if a < 0.0 { v + a * a / (-2.0 * limits.jerk_min) } else { v };
+    let after = if a > 0.0 { v - a * a / (2.0 * limits.jerk_max) } else { v };
     let within = |x: f64, low: f64, high: f64| x >= low && x <= high;
     limits.velocity_max > 0.0
         && limits.acceleration_max > 0.0

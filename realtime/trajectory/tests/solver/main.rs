@@ -1,4 +1,5 @@
 //! The solver against ruckig's durations, against exact integration, and against itself.
+#![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate and print")]
 
 mod cases;
 mod check;

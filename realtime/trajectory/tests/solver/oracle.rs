@@ -25,20 +25,9 @@ fn every_valid_case_is_solved_and_no_invalid_one() {
     for case in cases::load() {
         let solved = solve_any(&case);
         match case.code {
-            -100 => assert!(
-                solved.is_err(),
-                "case {} ({}) is invalid and was solved",
-                case.id,
-                case.tag
-            ),
+            -100 => assert!(solved.is_err(), "case {} ({}) is invalid and was solved", case.id, case.tag),
             -104 => {}
-            code => assert!(
-                solved.is_ok(),
-                "case {} ({}, code {code}): {}",
-                case.id,
-                case.tag,
-                solved.unwrap_err()
-            ),
+            code => assert!(solved.is_ok(), "case {} ({}, code {code}): {}", case.id, case.tag, solved.unwrap_err()),
         }
     }
 }
@@ -98,26 +87,14 @@ fn every_trajectory_is_valid_by_exact_integration() {
         };
         for (index, (profile, joint)) in profiles.iter().zip(&case.joints).enumerate() {
             let position = case.interface == Interface::Position;
-            let faults = check(
-                profile,
-                &joint.start,
-                &joint.target,
-                position,
-                &joint.limits,
-            );
-            let reach = profile.segments().fold(1.0_f64, |reach, segment| {
-                reach.max(segment.start.position.abs())
-            });
+            let faults = check(profile, &joint.start, &joint.target, position, &joint.limits);
+            let reach = profile.segments().fold(1.0_f64, |reach, segment| reach.max(segment.start.position.abs()));
             let bounded = |limit: f64, start: f64| match limit.is_finite() {
                 true => limit.max(start.abs()).max(1.0),
                 false => start.abs().max(1.0),
             };
             let limits = &joint.limits;
-            let jerk = if limits.jerk_max.is_finite() {
-                limits.jerk_max
-            } else {
-                0.0
-            };
+            let jerk = if limits.jerk_max.is_finite() { limits.jerk_max } else { 0.0 };
             let push = bounded(limits.acceleration_max, joint.start.acceleration) + duration * jerk;
             let speed = bounded(limits.velocity_max, joint.start.velocity) + duration * push;
             let relative = Faults {
@@ -127,27 +104,12 @@ fn every_trajectory_is_valid_by_exact_integration() {
                 drift: faults.drift / (reach + duration * speed),
                 ..faults
             };
-            let name = || {
-                format!(
-                    "case {} ({}) joint {index}: {faults:?} {joint:?}",
-                    case.id, case.tag
-                )
-            };
-            assert!(
-                relative.position <= 1e-14 && relative.drift <= 1e-14,
-                "{relative:?} {}",
-                name()
-            );
-            assert!(
-                relative.velocity <= 1e-14 && relative.acceleration <= 1e-14,
-                "{relative:?} {}",
-                name()
-            );
+            let name = || format!("case {} ({}) joint {index}: {faults:?} {joint:?}", case.id, case.tag);
+            assert!(relative.position <= 1e-14 && relative.drift <= 1e-14, "{relative:?} {}", name());
+            assert!(relative.velocity <= 1e-14 && relative.acceleration <= 1e-14, "{relative:?} {}", name());
             if case.tag != "huge" && duration < 50.0 {
                 assert!(
-                    faults.position <= 1e-9
-                        && faults.velocity <= 1e-11
-                        && faults.acceleration <= 1e-11,
+                    faults.position <= 1e-9 && faults.velocity <= 1e-11 && faults.acceleration <= 1e-11,
                     "{}",
                     name()
                 );
@@ -166,17 +128,13 @@ fn every_trajectory_is_valid_by_exact_integration() {
 /// Where ruckig achieves a straight line, so does this, in the same time.
 #[test]
 fn straight_lines_are_straight() {
-    for case in cases::load()
-        .iter()
-        .filter(|case| case.straight && case.verified && case.joints.len() > 1)
-    {
+    for case in cases::load().iter().filter(|case| case.straight && case.verified && case.joints.len() > 1) {
         if case.synchronization != tandem_trajectory::Synchronization::Phase {
             continue;
         }
         let (duration, profiles) = solve_any(case).expect("solved above");
         let lead = (0..profiles.len()).max_by(|a, b| {
-            let reach =
-                |i: usize| (case.joints[i].target.position - case.joints[i].start.position).abs();
+            let reach = |i: usize| (case.joints[i].target.position - case.joints[i].start.position).abs();
             reach(*a).total_cmp(&reach(*b))
         });
         let lead = lead.expect("there are joints");
@@ -187,11 +145,7 @@ fn straight_lines_are_straight() {
             for index in 0..profiles.len() {
                 if whole(lead) != 0.0 && case.interface == Interface::Position {
                     let off = gone(index) - gone(lead) * (whole(index) / whole(lead));
-                    assert!(
-                        off.abs() <= 1e-10,
-                        "case {} joint {index} at {time}: {off:e} off the line",
-                        case.id
-                    );
+                    assert!(off.abs() <= 1e-10, "case {} joint {index} at {time}: {off:e} off the line", case.id);
                 }
             }
         }
@@ -212,32 +166,13 @@ fn the_input_that_crashes_ruckig_is_solved() {
         .skip(8)
         .map(|word| word.parse().expect("a number"))
         .collect();
-    let [p0, v0, a0, pf, vf, af] = numbers[..6] else {
-        panic!("{numbers:?}")
-    };
-    input.start[0] = State {
-        position: p0,
-        velocity: v0,
-        acceleration: a0,
-    };
-    input.target[0] = State {
-        position: pf,
-        velocity: vf,
-        acceleration: af,
-    };
+    let [p0, v0, a0, pf, vf, af] = numbers[..6] else { panic!("{numbers:?}") };
+    input.start[0] = State { position: p0, velocity: v0, acceleration: a0 };
+    input.target[0] = State { position: pf, velocity: vf, acceleration: af };
     let trajectory = Trajectory::calculate(&input).expect("it is valid");
-    let faults = check(
-        &trajectory.profiles()[0],
-        &input.start[0],
-        &input.target[0],
-        true,
-        &input.limits[0],
-    );
+    let faults = check(&trajectory.profiles()[0], &input.start[0], &input.target[0], true, &input.limits[0]);
     assert!(
-        faults.position < 1e-12
-            && faults.velocity < 1e-13
-            && faults.excess < 1e-13
-            && faults.jerk < 1e-13,
+        faults.position < 1e-12 && faults.velocity < 1e-13 && faults.excess < 1e-13 && faults.jerk < 1e-13,
         "{faults:?}"
     );
 }

@@ -8,10 +8,7 @@ use tandem_trajectory::{Input, Limits, State, Synchronization, Trajectory};
 
 /// Problems of each kind; the environment can ask for more.
 fn count() -> usize {
-    std::env::var("TANDEM_SWEEP")
-        .ok()
-        .and_then(|count| count.parse().ok())
-        .unwrap_or(10_000)
+    std::env::var("TANDEM_SWEEP").ok().and_then(|count| count.parse().ok()).unwrap_or(4_000)
 }
 
 fn input<const N: usize>(kind: Kind, problems: &[Problem; N]) -> Input<N> {
@@ -20,11 +17,7 @@ fn input<const N: usize>(kind: Kind, problems: &[Problem; N]) -> Input<N> {
         target: problems.map(|problem| problem.target),
         limits: problems.map(|problem| problem.limits),
         // Joints of absurdly different scales share no duration.
-        synchronization: [if kind == Kind::Scales {
-            Synchronization::None
-        } else {
-            Synchronization::Time
-        }; N],
+        synchronization: [if kind == Kind::Scales { Synchronization::None } else { Synchronization::Time }; N],
         ..Input::default()
     }
 }
@@ -39,14 +32,9 @@ fn every_random_problem_is_solved_validly() {
         for index in 0..count() / 3 {
             let problems = [source.problem(), source.problem(), source.problem()];
             let trajectory = Trajectory::calculate(&input(kind, &problems));
-            let trajectory =
-                trajectory.unwrap_or_else(|error| panic!("{kind:?} {index}: {error} {problems:?}"));
+            let trajectory = trajectory.unwrap_or_else(|error| panic!("{kind:?} {index}: {error} {problems:?}"));
             for (profile, problem) in trajectory.profiles().iter().zip(&problems) {
-                let Problem {
-                    start,
-                    target,
-                    limits,
-                } = problem;
+                let Problem { start, target, limits } = problem;
                 let duration = profile.duration();
                 let faults = check(profile, start, target, true, limits);
                 let finite = |limit: f64| if limit.is_finite() { limit } else { 0.0 };
@@ -57,14 +45,9 @@ fn every_random_problem_is_solved_validly() {
                     .max(start.acceleration.abs())
                     .max(1.0)
                     + blur / 1e-16;
-                let speed = limits
-                    .velocity_max
-                    .max(-limits.velocity_min)
-                    .max(start.velocity.abs())
-                    .max(1.0)
-                    + duration * push;
-                let reach =
-                    start.position.abs().max(target.position.abs()).max(1.0) + duration * speed;
+                let speed =
+                    limits.velocity_max.max(-limits.velocity_min).max(start.velocity.abs()).max(1.0) + duration * push;
+                let reach = start.position.abs().max(target.position.abs()).max(1.0) + duration * speed;
                 let relative = [
                     faults.position / reach,
                     faults.velocity / speed,
@@ -84,13 +67,9 @@ fn every_random_problem_is_solved_validly() {
                         && relative[4] < 1e-13,
                     "{kind:?} {index}: {relative:?} {faults:?} T = {duration} {problem:?}"
                 );
-                if !matches!(kind, Kind::Scales | Kind::HighLimits | Kind::Infinite)
-                    && duration < 100.0
-                {
+                if !matches!(kind, Kind::Scales | Kind::HighLimits | Kind::Infinite) && duration < 100.0 {
                     assert!(
-                        faults.position <= 1e-9
-                            && faults.velocity <= 1e-11
-                            && faults.acceleration <= 1e-11,
+                        faults.position <= 1e-9 && faults.velocity <= 1e-11 && faults.acceleration <= 1e-11,
                         "{kind:?} {index}: {faults:?} T = {duration} {problem:?}"
                     );
                 }
@@ -119,12 +98,7 @@ fn map_state(state: State, by: [f64; 3]) -> State {
 
 /// The same motion with lengths multiplied by `length` and times by `time`.
 fn scaled(problem: &Problem, length: f64, time: f64) -> Problem {
-    let by = [
-        length,
-        length / time,
-        length / time / time,
-        length / time / time / time,
-    ];
+    let by = [length, length / time, length / time / time, length / time / time / time];
     let limits = &problem.limits;
     let state = |s: State| map_state(s, [by[0], by[1], by[2]]);
     Problem {
@@ -165,36 +139,15 @@ fn reversed(problem: &Problem) -> Problem {
     Problem {
         start: state(problem.target),
         target: state(problem.start),
-        limits: Limits {
-            acceleration_min: -l.acceleration_max,
-            acceleration_max: -l.acceleration_min,
-            ..*l
-        },
+        limits: Limits { acceleration_min: -l.acceleration_max, acceleration_max: -l.acceleration_min, ..*l },
     }
 }
 
 /// A start within the limits, so that the motion backwards is a problem, too.
 fn starts_inside(problem: &Problem) -> bool {
-    let Problem {
-        start:
-            State {
-                velocity: v,
-                acceleration: a,
-                ..
-            },
-        limits: l,
-        ..
-    } = *problem;
-    let after = if a > 0.0 {
-        v + a * a / (-2.0 * l.jerk_min)
-    } else {
-        v
-    };
-    let before = if a < 0.0 {
-        v - a * a / (2.0 * l.jerk_max)
-    } else {
-        v
-    };
+    let Problem { start: State { velocity: v, acceleration: a, .. }, limits: l, .. } = *problem;
+    let after = if a > 0.0 { v + a * a / (-2.0 * l.jerk_min) } else { v };
+    let before = if a < 0.0 { v - a * a / (2.0 * l.jerk_max) } else { v };
     l.acceleration_min < a
         && a < l.acceleration_max
         && after < l.velocity_max
@@ -213,21 +166,9 @@ fn durations_share_the_symmetries_of_the_problem() {
         for index in 0..count() {
             let problem = source.problem();
             let own = duration(&problem);
-            assert_eq!(
-                duration(&mirrored(&problem)),
-                own,
-                "{kind:?} {index} mirrored: {problem:?}"
-            );
-            assert_eq!(
-                duration(&scaled(&problem, 16.0, 1.0)),
-                own,
-                "{kind:?} {index} longer: {problem:?}"
-            );
-            assert_eq!(
-                duration(&scaled(&problem, 1.0, 0.125)),
-                own / 8.0,
-                "{kind:?} {index} faster: {problem:?}"
-            );
+            assert_eq!(duration(&mirrored(&problem)), own, "{kind:?} {index} mirrored: {problem:?}");
+            assert_eq!(duration(&scaled(&problem, 16.0, 1.0)), own, "{kind:?} {index} longer: {problem:?}");
+            assert_eq!(duration(&scaled(&problem, 1.0, 0.125)), own / 8.0, "{kind:?} {index} faster: {problem:?}");
             if kind != Kind::Outside && kind != Kind::Infinite && starts_inside(&problem) {
                 backwards += 1;
                 let other = duration(&reversed(&problem));
