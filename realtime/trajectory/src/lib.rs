@@ -66,6 +66,7 @@
 extern crate std;
 
 mod brake;
+mod covering;
 mod cursor;
 mod error;
 mod extrema;

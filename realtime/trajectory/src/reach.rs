@@ -13,7 +13,8 @@
 //! because each limit holds for both and is convex. Its jerk takes at most 13 constant values.
 
 use crate::{
-    extremal::{Extremal, Joint, Phase, Shape, Tie},
+    covering::Tie,
+    extremal::{Extremal, Joint, Phase, Shape},
     swing::{ARRIVAL_SHARE, Durations, Swing},
 };
 

@@ -311,11 +311,7 @@ fn the_parts_of_the_s471_box_are_recognised() {
                 }
             }
         }
-        println!(
-            "{:>22}: {hits} of {looks} right, {sure} sure, worst position error {:.2} mm",
-            part.name,
-            worst * 1e3
-        );
+        println!("{:>22}: {hits} of {looks} right, {sure} sure, worst position error {:.2} mm", part.name, worst * 1e3);
         right += hits;
     }
     let all = looks as usize * cell.product.parts.len();

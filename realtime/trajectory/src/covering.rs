@@ -1,0 +1,187 @@
+//! The first duration in which an extremal motion covers a distance.
+//!
+//! See [`crate::extremal`] for the shape of the curve P(T) and the slope whose zeros cut it.
+
+use crate::{
+    extremal::{Extremal, Joint},
+    root::root_between,
+    sqrt::sqrt,
+};
+
+/// How far short of a distance counts as having covered it.
+///
+/// A motion recomputed every cycle from its own output collects roundings. Near a moving target there
+/// is nothing left with which to correct them, and a motion that misses by a rounding would go round
+/// once more.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tie {
+    /// Anywhere.
+    pub(crate) tight: f64,
+    /// At the top of the curve, from where it would be a long way round.
+    pub(crate) loose: f64,
+}
+
+/// How many times the rounding of the inputs is forgiven where the alternative is a jump.
+const LOOSE: f64 = 32768.0;
+
+impl Tie {
+    /// `rounding` is that of the inputs, `allowed` what the caller allows.
+    pub(crate) fn new(rounding: f64, allowed: f64) -> Self {
+        Tie { tight: rounding + allowed, loose: LOOSE * rounding + allowed }
+    }
+}
+
+impl Extremal {
+    /// The first duration in `[from, to]` at which `distance` is covered, when less is covered at
+    /// `from`.
+    pub(crate) fn first_covering(&self, distance: f64, tie: Tie, from: f64, to: f64) -> Option<f64> {
+        let exact = |time: f64| {
+            let shape = self.shape(time);
+            let off = self.distance(&shape) - distance;
+            let known = off.abs() <= self.tolerance(time, &shape) / 16.0;
+            (if known { 0.0 } else { off }, self.slope(&shape))
+        };
+        let (mut begin, mut before) = (from, self.distance_in(from));
+        let convex = self.convex_from();
+        if from < convex {
+            let end = to.min(convex);
+            let mut marks = Marks::between(from, end);
+            self.mark_pieces(&mut marks);
+            marks.push(end);
+            for &mark in marks.sorted() {
+                let covered = self.distance_in(mark);
+                if covered >= distance - tie.tight {
+                    let middle = begin + (mark - begin) / 2.0;
+                    return Some(if covered <= distance { mark } else { root_between(exact, begin, mark, middle) });
+                }
+                if covered < before && before >= distance - tie.loose {
+                    return Some(begin);
+                }
+                (begin, before) = (mark, covered);
+            }
+        }
+        let end = to.min(self.peak_time);
+        if begin < end {
+            if before >= distance - tie.loose && self.slope(&self.shape(begin)) < 0.0 {
+                return Some(begin);
+            }
+            let covered = self.distance_in(end);
+            if covered > distance {
+                // About the second power of the time is covered.
+                let share = sqrt(((distance - before) / (covered - before)).clamp(0.0, 1.0));
+                return Some(root_between(exact, begin, end, begin + (end - begin) * share));
+            }
+            if covered >= distance - tie.tight {
+                return Some(end);
+            }
+            if covered > before {
+                (begin, before) = (end, covered);
+            }
+        }
+        if to > self.peak_time && self.joint.peak > 0.0 {
+            let cruise = from.max(self.peak_time);
+            let time = cruise + (distance - self.distance_in(cruise)).max(0.0) / self.joint.peak;
+            if time <= to {
+                return Some(time);
+            }
+        }
+        (before >= distance - tie.loose).then_some(begin)
+    }
+
+    /// The duration from which on P(T) is convex until the cruise begins: that at which the fall first
+    /// reaches from positive to negative accelerations. From there on `w` and `-x y` only grow.
+    fn convex_from(&self) -> f64 {
+        let (limit, c) = if self.c >= 0.0 { (self.joint.top, self.c) } else { (self.joint.bottom, -self.c) };
+        let s = if c <= limit * limit { sqrt(c) } else { (limit * limit + c) / (2.0 * limit) };
+        self.offset + 2.0 * self.mean * s
+    }
+
+    /// Marks every duration at which the formula or the sign of the slope of P changes.
+    fn mark_pieces(&self, marks: &mut Marks) {
+        let Joint { start: [v0, _], end: [vf, _], top, bottom, rise, fall, .. } = self.joint;
+        let (mean, c, k_start, k_end) = (self.mean, self.c, self.k_start, self.k_end);
+        if mean == 0.0 {
+            marks.push(-v0 / top - vf / bottom);
+            return;
+        }
+        let mut mark = |s: f64| marks.push(self.offset + 2.0 * mean * s);
+        // Changes of case.
+        if top.is_finite() && top * top >= c {
+            let half = sqrt(top * top - c);
+            mark(top - half);
+            mark(top + half);
+        }
+        if bottom.is_finite() && bottom * bottom >= -c {
+            let half = sqrt(bottom * bottom + c);
+            mark(bottom - half);
+            mark(bottom + half);
+        }
+        if top.is_finite() && bottom.is_finite() {
+            let both = (top + bottom) * (top + bottom);
+            mark((both + c) / (2.0 * top));
+            mark((both - c) / (2.0 * bottom));
+            // Slope with both held: w = -beta A B / 2.
+            let crest = -fall * top * bottom / 2.0;
+            mark(((crest - k_start) / top + (crest - k_end) / bottom) / (2.0 * mean) + (top + bottom) / 2.0);
+        }
+        // Slope without hold: (alpha + 2 beta) s^4 + 4 (K0 + Kf) s^2 + alpha c^2 = 0.
+        for square in quadratic(rise + 2.0 * fall, 2.0 * (k_start + k_end), rise * c * c) {
+            if square > 0.0 {
+                mark(sqrt(square));
+            }
+        }
+        // Slope while held at A: m y^2 - beta A y / 2 + Kf = 0, and the same in reverse at -B.
+        if top.is_finite() {
+            for low in quadratic(mean, -fall * top / 4.0, k_end) {
+                mark(((top - low) * (top - low) + c) / (2.0 * top));
+            }
+        }
+        if bottom.is_finite() {
+            for high in quadratic(mean, fall * bottom / 4.0, k_start) {
+                mark(((bottom + high) * (bottom + high) - c) / (2.0 * bottom));
+            }
+        }
+    }
+}
+
+/// Real roots of `a z^2 + 2 b z + c` with `a > 0`, without cancellation; empty is NaN.
+fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
+    let discriminant = b * b - a * c;
+    if discriminant < 0.0 {
+        return [f64::NAN; 2];
+    }
+    let root = sqrt(discriminant);
+    let q = if b > 0.0 { -b - root } else { root - b };
+    [q / a, if q == 0.0 { 0.0 } else { c / q }]
+}
+
+/// Durations inside an open interval, sorted; at most 16.
+struct Marks {
+    times: [f64; 16],
+    count: usize,
+    from: f64,
+    to: f64,
+}
+
+impl Marks {
+    fn between(from: f64, to: f64) -> Self {
+        Marks { times: [0.0; 16], count: 0, from, to }
+    }
+
+    /// Keeps `time` if it lies inside; NaN does not.
+    fn push(&mut self, time: f64) {
+        if time > self.from && time <= self.to && self.count < self.times.len() {
+            let mut place = self.count;
+            while place > 0 && self.times[place - 1] > time {
+                self.times[place] = self.times[place - 1];
+                place -= 1;
+            }
+            self.times[place] = time;
+            self.count += 1;
+        }
+    }
+
+    fn sorted(&self) -> &[f64] {
+        &self.times[..self.count]
+    }
+}
