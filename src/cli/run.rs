@@ -7,6 +7,7 @@ use clap::Args;
 use comfy_table::{Table, presets};
 use serde_json::json;
 use tandem_config::Cell;
+use tandem_msg::{Coded, RoleStats};
 
 use super::progress::Screen;
 use super::{check, exit};
@@ -44,6 +45,21 @@ pub(super) struct RunArgs {
 struct Ended {
     outcome: Outcome,
     summary: Summary,
+    /// Health of the loops; none in lockstep, where nothing is late.
+    loops: Vec<RoleStats>,
+    restarts: u32,
+}
+
+/// Why a run could not begin or not come to an end.
+struct Refusal {
+    message: String,
+    exit_code: u8,
+}
+
+impl Refusal {
+    fn failed(message: impl ToString) -> Self {
+        Self { message: message.to_string(), exit_code: exit::FAILED }
+    }
 }
 
 pub(super) fn run(args: &RunArgs) -> u8 {
@@ -87,9 +103,9 @@ pub(super) fn run(args: &RunArgs) -> u8 {
             report(args, &ended, began.elapsed().as_secs_f64(), &record.id, &store);
             exit_code(&ended.outcome)
         }
-        Err(message) => {
-            anstream::eprintln!("{message}");
-            exit::FAILED
+        Err(refusal) => {
+            anstream::eprintln!("{}", refusal.message);
+            refusal.exit_code
         }
     }
 }
@@ -132,17 +148,17 @@ fn lockstep(
     library: Library,
     options: RunOptions,
     on_event: &mut dyn FnMut(&Event),
-) -> Result<Ended, String> {
-    let mut sim = SimCell::new(cell, library, options).map_err(|error| error.to_string())?;
-    signals::listen().map_err(|error| format!("signals cannot be handled: {error}"))?;
+) -> Result<Ended, Refusal> {
+    let mut sim = SimCell::new(cell, library, options).map_err(Refusal::failed)?;
+    signals::listen().map_err(|error| Refusal::failed(format!("signals cannot be handled: {error}")))?;
     let outcome = loop {
-        let ended = sim.run(store, on_event, |_| signals::asked() > 0).map_err(|error| error.to_string())?;
+        let ended = sim.run(store, on_event, |_| signals::asked() > 0).map_err(Refusal::failed)?;
         match ended {
             Some(outcome) => break outcome,
             None => sim.halt(),
         }
     };
-    Ok(Ended { outcome, summary: sim.summary() })
+    Ok(Ended { outcome, summary: sim.summary(), loops: Vec::new(), restarts: 0 })
 }
 
 fn live(
@@ -152,22 +168,29 @@ fn live(
     library: Library,
     options: RunOptions,
     on_event: &mut dyn FnMut(&Event),
-) -> Result<Ended, String> {
-    let ended = live::run(cell, product, library, store, options, on_event).map_err(|error| error.to_string())?;
-    Ok(Ended { outcome: ended.outcome, summary: ended.summary })
+) -> Result<Ended, Refusal> {
+    let ended = live::run(cell, product, library, store, options, on_event)
+        .map_err(|error| Refusal { message: error.to_string(), exit_code: error.exit_code() })?;
+    Ok(Ended { outcome: ended.outcome, summary: ended.summary, loops: ended.loops.to_vec(), restarts: ended.restarts })
 }
 
 /// Prints the summary: the last line of `--json`, or a table.
 fn report(args: &RunArgs, ended: &Ended, wall_time_s: f64, run: &str, store: &Store) {
-    let Ended { outcome, summary } = ended;
+    let Ended { outcome, summary, loops, restarts } = ended;
     if args.json {
+        for stats in loops {
+            anstream::println!("{}", loop_line(stats));
+        }
         let mut line = serde_json::to_value(summary).unwrap_or_default();
         line["event"] = json!("summary");
         line["outcome"] = json!(outcome.name());
         line["wall_time_s"] = json!(wall_time_s);
         anstream::println!("{line}");
     } else {
-        anstream::println!("\n{}", table(summary, wall_time_s));
+        anstream::println!("\n{}", table(summary, *restarts, wall_time_s));
+        if !loops.is_empty() {
+            anstream::println!("\n{}", loop_table(loops));
+        }
     }
     if *outcome != Outcome::Completed {
         anstream::eprintln!("{outcome}");
@@ -175,7 +198,39 @@ fn report(args: &RunArgs, ended: &Ended, wall_time_s: f64, run: &str, store: &St
     anstream::eprintln!("journal: `tandem journal show {run}` (in {})", store.shown_url());
 }
 
-fn table(summary: &Summary, wall_time_s: f64) -> Table {
+/// How a role's loop kept its time.
+fn loop_line(stats: &RoleStats) -> serde_json::Value {
+    let role = stats.role.get().map_or("unknown", Coded::name);
+    json!({"event": "loop", "role": role, "cycles": stats.cycles, "missed": stats.missed,
+        "lateness_max_us": stats.lateness_ns[1] / 1_000, "busy_max_us": stats.busy_ns[1] / 1_000,
+        "fifo": stats.fifo == 1, "memory_locked": stats.locked == 1})
+}
+
+fn loop_table(loops: &[RoleStats]) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING).set_header([
+        "loop",
+        "cycles",
+        "missed",
+        "latest wake-up",
+        "longest cycle",
+        "scheduling",
+    ]);
+    for stats in loops {
+        let ms = |ns: u64| format!("{:.2} ms", ns as f64 * 1e-6);
+        table.add_row([
+            stats.role.get().map_or("unknown", Coded::name).to_owned(),
+            stats.cycles.to_string(),
+            stats.missed.to_string(),
+            ms(stats.lateness_ns[1]),
+            ms(stats.busy_ns[1]),
+            if stats.fifo == 1 { "realtime" } else { "normal" }.to_owned(),
+        ]);
+    }
+    table
+}
+
+fn table(summary: &Summary, restarts: u32, wall_time_s: f64) -> Table {
     let clearance = summary.min_clearance_m.map_or("the arm did not move".to_owned(), |m| format!("{:.0} mm", m * 1e3));
     let rows = [
         ("boxes completed", format!("{} of {}", summary.boxes_completed, summary.boxes_requested)),
@@ -183,6 +238,7 @@ fn table(summary: &Summary, wall_time_s: f64) -> Table {
         ("attempts failed", summary.steps_failed.to_string()),
         ("protective stops", summary.stops.to_string()),
         ("contacts", summary.contacts.to_string()),
+        ("restarted processes", restarts.to_string()),
         ("smallest clearance", clearance),
         ("cell time", format!("{:.1} s", summary.sim_time_s)),
         ("wall time", format!("{wall_time_s:.1} s ({:.0}x)", summary.sim_time_s / wall_time_s)),

@@ -25,24 +25,24 @@ pub struct RunRecord {
 }
 
 pub(super) async fn begin(pool: &AnyPool, run: &RunRecord) -> Result<(), StoreError> {
-    let mut transaction = pool.begin().await?;
-    let id = run.id.to_lowercase();
-    let known = sqlx::query("SELECT id FROM run WHERE id = ?").bind(&id).fetch_optional(&mut *transaction).await?;
-    if known.is_none() {
-        sqlx::query("INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
-            .bind(&id)
-            .bind(run.cell.to_lowercase())
-            .bind(run.product.to_lowercase())
-            .bind(format!("{:016x}", run.config_hash))
-            // Seeds use all 64 bits; the database's integers are signed.
-            .bind(run.seed.cast_signed())
-            .bind(i64::from(run.boxes))
-            .bind(run.started_ns)
-            .bind("running")
-            .execute(&mut *transaction)
-            .await?;
+    // One statement, so that two cells that start on one file wait for each other: SQLite
+    // refuses at once what first reads and then writes while another writes.
+    let written = sqlx::query("INSERT INTO run VALUES (?, ?, ?, ?, ?, ?, ?, ?)")
+        .bind(run.id.to_lowercase())
+        .bind(run.cell.to_lowercase())
+        .bind(run.product.to_lowercase())
+        .bind(format!("{:016x}", run.config_hash))
+        // Seeds use all 64 bits; the database's integers are signed.
+        .bind(run.seed.cast_signed())
+        .bind(i64::from(run.boxes))
+        .bind(run.started_ns)
+        .bind("running")
+        .execute(pool)
+        .await;
+    match written {
+        Err(sqlx::Error::Database(error)) if error.is_unique_violation() => Ok(()),
+        other => Ok(other.map(|_| ())?),
     }
-    Ok(transaction.commit().await?)
 }
 
 pub(super) async fn end(pool: &AnyPool, run: &str, outcome: &str) -> Result<(), StoreError> {
