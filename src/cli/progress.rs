@@ -109,6 +109,17 @@ fn subject(who: &str, form: &str) -> String {
 fn remark(kind: &EventKind) -> Option<String> {
     Some(match kind {
         EventKind::Doubt { part, look, reason } => format!("{part}: look {look} is not good enough: {reason}"),
+        EventKind::Verdict { part, assigned, reason, robot_reach_margin_m, robot_load_margin_kg, .. }
+            if *assigned != "robot" =>
+        {
+            // Eq. (2): what is within the robot's reach and load and yet not its own is flexible.
+            let why = match (*robot_reach_margin_m > 0.0, *robot_load_margin_kg > 0.0) {
+                (false, _) => "it is out of the robot's reach",
+                (_, false) => "it is too heavy for the robot",
+                (true, true) => "it is flexible",
+            };
+            format!("{part}: {reason}: {why}")
+        }
         EventKind::Prompt { text, .. } => format!("to the person: {text}"),
         EventKind::Answer { answer, class, .. } if *answer != "done" && *answer != "started" => {
             format!("the person: {answer}{}", class.map(|class| format!(" ({class})")).unwrap_or_default())
