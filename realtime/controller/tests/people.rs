@@ -67,6 +67,23 @@ fn a_person_who_appears_is_a_protective_stop() {
     cell.assert_limits();
 }
 
+/// After a stop the arm stands a millimetre beside its goal, and a person holds the part: the tool lets
+/// go all the same, and the arm does not move for it.
+#[test]
+fn a_tool_acts_beside_a_person_when_the_arm_is_near_enough() {
+    let mut cell = Cell::new();
+    assert_eq!(cell.perform(task(1, down(0.80, 0.20, 0.35, 0.0))), MotionPhase::Done);
+    cell.person_at(1.35, 0.20, [0.0; 3]);
+    cell.human.capsules[1].ends = [[0.85, 0.20, 0.33], [0.90, 0.20, 0.33]];
+    let before = cell.tcp();
+    let mut release = task(2, down(0.801, 0.20, 0.35, 0.0));
+    (release.approach, release.retract) = (0.0, 0.0);
+    release.action = EffectorAction::Release.into();
+    cell.give(release);
+    cell.until("done", 2_000, |cell| cell.phase() == MotionPhase::Done);
+    assert!((cell.tcp().translation.vector - before.translation.vector).norm() < 1e-6);
+}
+
 /// Hand-over: somebody stands at the resting arm, hand at the tool. That is no stop; the arm waits with
 /// its next motion until they have stepped back.
 #[test]

@@ -6,7 +6,7 @@ use super::Controller;
 use crate::effector::Answer;
 use crate::inputs::{Heard, task_is_valid};
 use crate::job::Stage;
-use crate::plan::{Progress, Tools};
+use crate::plan::{Goal, Progress, Tools};
 
 impl Controller {
     /// Takes a new task once the arm is at rest.
@@ -82,7 +82,15 @@ impl Controller {
             return;
         }
         if !begun {
-            self.search.begin(&self.motion.set().position, &self.job.goal(&self.params.home));
+            let goal = self.job.goal(&self.params.home);
+            if !self.job.away && goal.joints.is_none() && goal.approach <= 0.0 && self.stands_at(&goal) {
+                // Nothing but the tool is to act. After a stop the arm stands a little beside the goal, and a
+                // person who holds the part would keep it from moving that little for ever.
+                self.guard.set_context(self.job.attached(), &self.job.touch());
+                self.job.stage = Stage::Settling { since: now };
+                return;
+            }
+            self.search.begin(&self.motion.set().position, &goal);
             self.job.stage = Stage::Planning { begun: true };
             self.plan_is_current = true;
         }
@@ -98,6 +106,15 @@ impl Controller {
                 self.begin_leg(now, 0);
             }
         }
+    }
+
+    /// Whether the TCP stands at the goal, as near as brakes hold it.
+    fn stands_at(&self, goal: &Goal) -> bool {
+        /// Metres and radians.
+        const NEAR: [f64; 2] = [0.002, 0.005];
+        let here = self.chain.forward(&self.motion.set().position).base_from_tcp;
+        (here.translation.vector - goal.base_from_tcp.translation.vector).norm() <= NEAR[0]
+            && here.rotation.angle_to(&goal.base_from_tcp.rotation) <= NEAR[1]
     }
 
     /// Enters a stretch, or what comes after the last.
