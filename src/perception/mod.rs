@@ -2,7 +2,7 @@
 //!
 //! The role waits for a cloud of a presented part, samples it ([`sample`]), asks the
 //! trained model ([`model`], [`network`]) which class of feature it shows and which points
-//! are of it, and fits pose and dimensions to those points ([`fit`]). An answer whose
+//! are of it, and fits pose and dimensions to those points ([`mod@fit`]). An answer whose
 //! calibrated probability stays below the model's threshold, or that no shape can be
 //! fitted to, is `Unsure`: a person is asked, nothing is papered over.
 //!

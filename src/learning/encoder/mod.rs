@@ -1,7 +1,7 @@
 //! Training of the encoder and both decoders on generated parts.
 //!
 //! [`Specimen`] draws parts and views, [`example`] scans them with the plant's depth
-//! camera and samples the clouds exactly as perception does, [`train`] fits the network
+//! camera and samples the clouds exactly as perception does, [`mod@train`] fits the network
 //! and measures it on parts it never saw.
 
 mod adam;
