@@ -12,6 +12,7 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("realtime/clearance", &["tandem-msg", "tandem-kinematics"]),
     ("realtime/controller", &["tandem-msg", "tandem-trajectory", "tandem-kinematics", "tandem-clearance"]),
     ("config", &["tandem-msg", "tandem-kinematics", "tandem-clearance", "tandem-controller"]),
+    ("benches/peers", &[]),
 ];
 
 /// Crates that nothing realtime and no message may name.
