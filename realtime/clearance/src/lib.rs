@@ -8,7 +8,8 @@
 //!   arm itself, with the link, the object and the points;
 //! - [`Monitor::separation`]: the same towards people, with their velocity;
 //! - [`Monitor::is_clear`], [`Monitor::path_is_clear`]: whether a position, or a whole
-//!   straight motion of the joints, keeps a margin. The motion is swept, not sampled.
+//!   straight motion of the joints, keeps a margin. The motion is swept, not sampled; [`MotionSweep`]
+//!   is the same a look at a time.
 //!
 //! [`ssm`] holds the arithmetic of speed and separation monitoring: how far the arm must
 //! stay from a person who moves, and how fast it may go at the distance there is.
@@ -29,3 +30,4 @@ mod sweep;
 pub use body::{ArmBody, BodyError, LINK_CAPSULES_MAX, LinkCapsule, SELF_PAIRS_MAX};
 pub use monitor::{Clearance, Monitor, Separation};
 pub use obstacle::SceneFault;
+pub use sweep::{MotionSweep, Swept};

@@ -1,12 +1,12 @@
 //! The queries: one arm, one scene, one carried part, the people in view.
 
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Vector3;
 use tandem_kinematics::{JOINTS_MAX, LinkPoses};
 use tandem_msg::{AttachedPart, Capsule, HUMAN_CAPSULES_MAX, SCENE_OBJECTS_MAX, SceneObject};
 
 use crate::kernel::{Near, OrientedBox};
 use crate::obstacle::{CarriedBox, FAR, Obstacle, SceneFault, capsule_to_capsule};
-use crate::{ArmBody, LINK_CAPSULES_MAX};
+use crate::{ArmBody, LINK_CAPSULES_MAX, LinkCapsule};
 
 /// Objects a task may allow the tool to touch.
 const TOUCH_MAX: usize = 8;
@@ -56,14 +56,39 @@ impl Separation {
 
 /// A capsule of the arm where the arm is.
 #[derive(Clone, Copy)]
-struct Placed {
-    ends: [Vector3<f64>; 2],
-    centre: Vector3<f64>,
+pub(crate) struct Placed {
+    pub(crate) ends: [Vector3<f64>; 2],
+    pub(crate) centre: Vector3<f64>,
     /// Half extents of the segment along the base axes.
-    half: Vector3<f64>,
-    radius: f64,
-    link: usize,
+    pub(crate) half: Vector3<f64>,
+    pub(crate) radius: f64,
+    pub(crate) link: usize,
     tool: bool,
+}
+
+impl Placed {
+    pub(crate) const UNUSED: Self = Self {
+        ends: [Vector3::new(0.0, 0.0, 0.0); 2],
+        centre: Vector3::new(0.0, 0.0, 0.0),
+        half: Vector3::new(0.0, 0.0, 0.0),
+        radius: 0.0,
+        link: 0,
+        tool: false,
+    };
+
+    #[inline]
+    pub(crate) fn of(capsule: &LinkCapsule, poses: &LinkPoses) -> Self {
+        let pose = &poses.base_from_link[capsule.link.min(JOINTS_MAX)];
+        let ends = capsule.ends.map(|end| pose.rotation * Vector3::from(end) + pose.translation.vector);
+        Self {
+            ends,
+            centre: (ends[0] + ends[1]) * 0.5,
+            half: (ends[1] - ends[0]).abs() * 0.5,
+            radius: capsule.radius,
+            link: capsule.link,
+            tool: capsule.tool,
+        }
+    }
 }
 
 /// The arm where it is, with what it carries.
@@ -81,15 +106,15 @@ pub(crate) struct PlacedArm {
 #[derive(Clone, Debug)]
 pub struct Monitor {
     body: ArmBody,
-    obstacles: [Obstacle; SCENE_OBJECTS_MAX],
+    pub(crate) obstacles: [Obstacle; SCENE_OBJECTS_MAX],
     /// Boxes around the obstacles along the base axes: centres and half extents.
-    bounds: [(Vector3<f64>, Vector3<f64>); SCENE_OBJECTS_MAX],
-    obstacle_count: usize,
+    pub(crate) bounds: [(Vector3<f64>, Vector3<f64>); SCENE_OBJECTS_MAX],
+    pub(crate) obstacle_count: usize,
     scene_valid: bool,
     human: [Capsule; HUMAN_CAPSULES_MAX],
     human_count: usize,
     human_valid: bool,
-    part: Option<CarriedBox>,
+    pub(crate) part: Option<CarriedBox>,
     part_valid: bool,
     touch: [u32; TOUCH_MAX],
 }
@@ -223,64 +248,22 @@ impl Monitor {
         self.human_count
     }
 
-    /// Longest way any point of the arm, or of what it carries, goes per unit of each joint (metres per
-    /// rad, or per metre), whatever the position: `offsets` are the lengths from joint frame to joint frame.
-    pub(crate) fn reaches(
-        &self,
-        offsets: &[f64; JOINTS_MAX],
-        tool: &Isometry3<f64>,
-        count: usize,
-    ) -> [f64; JOINTS_MAX] {
-        let mut beyond = [0.0_f64; JOINTS_MAX + 1];
-        for capsule in self.body.capsules() {
-            let tip = capsule.ends.iter().map(|end| Vector3::from(*end).norm()).fold(0.0, f64::max);
-            let slot = &mut beyond[capsule.link.min(JOINTS_MAX)];
-            *slot = slot.max(tip + capsule.radius);
-        }
-        if let Some(part) = &self.part {
-            let tip = (tool * part.tcp_from_part).translation.vector.norm() + part.half.norm();
-            beyond[count] = beyond[count].max(tip);
-        }
-        let mut reaches = [0.0; JOINTS_MAX];
-        let mut reach = 0.0_f64;
-        for joint in (0..count).rev() {
-            // From the frame of this joint: its own link's capsules, or on through the next frame.
-            let onwards = if joint + 1 < count { offsets[joint + 1] + reach } else { 0.0 };
-            reach = beyond[joint + 1].max(onwards);
-            reaches[joint] = reach;
-        }
-        reaches
+    /// Whether scene and part are such that anything can be said at all.
+    pub(crate) fn is_sound(&self) -> bool {
+        self.scene_valid && self.part_valid
     }
 
     /// The arm at these poses, or `None` when a number is not finite or absurd.
     fn place(&self, poses: &LinkPoses) -> Option<PlacedArm> {
         let last_link = poses.count.min(JOINTS_MAX);
-        let unused = Placed {
-            ends: [Vector3::zeros(); 2],
-            centre: Vector3::zeros(),
-            half: Vector3::zeros(),
-            radius: 0.0,
-            link: 0,
-            tool: false,
-        };
-        let mut arm = PlacedArm { capsules: [unused; LINK_CAPSULES_MAX], count: 0, part: None, last_link };
+        let mut arm = PlacedArm { capsules: [Placed::UNUSED; LINK_CAPSULES_MAX], count: 0, part: None, last_link };
         if !self.part_valid {
             return None;
         }
         let mut sound = true;
         for (slot, capsule) in arm.capsules.iter_mut().zip(self.body.capsules()) {
-            let pose = &poses.base_from_link[capsule.link.min(JOINTS_MAX)];
-            let place = |end: [f64; 3]| pose.rotation * Vector3::from(end) + pose.translation.vector;
-            let ends = capsule.ends.map(place);
-            sound &= ends.iter().all(|end| end.iter().all(|x| x.abs() <= FAR));
-            *slot = Placed {
-                ends,
-                centre: (ends[0] + ends[1]) * 0.5,
-                half: (ends[1] - ends[0]).abs() * 0.5,
-                radius: capsule.radius,
-                link: capsule.link,
-                tool: capsule.tool,
-            };
+            *slot = Placed::of(capsule, poses);
+            sound &= slot.ends.iter().all(|end| end.iter().all(|x| x.abs() <= FAR));
             arm.count += 1;
         }
         let tcp = &poses.base_from_tcp;
@@ -294,7 +277,7 @@ impl Monitor {
         if self.human_valid { self.place(poses) } else { None }
     }
 
-    fn may_touch(&self, id: u32) -> bool {
+    pub(crate) fn may_touch(&self, id: u32) -> bool {
         self.touch.contains(&id)
     }
 
@@ -433,7 +416,7 @@ fn part_to_arm(part: &OrientedBox, arm: &PlacedArm, best: &mut Clearance) {
 
 /// Squared distance of two boxes along the base axes, given by centre and half extents.
 #[inline]
-fn squared_gap(a: &Vector3<f64>, a_half: &Vector3<f64>, b: &Vector3<f64>, b_half: &Vector3<f64>) -> f64 {
+pub(crate) fn squared_gap(a: &Vector3<f64>, a_half: &Vector3<f64>, b: &Vector3<f64>, b_half: &Vector3<f64>) -> f64 {
     let mut sum = 0.0;
     for axis in 0..3 {
         let gap = ((a[axis] - b[axis]).abs() - a_half[axis] - b_half[axis]).max(0.0);

@@ -148,6 +148,8 @@ coded! {
         None = 0, "none";
         /// Hand-designed retract, transfer, approach: the paper's manual method.
         Manual = 1, "manual";
+        /// Rapidly-exploring random trees from both ends, when no hand-designed path is clear.
+        RrtConnect = 2, "rrt_connect";
     }
 }
 
