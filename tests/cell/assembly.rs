@@ -11,22 +11,25 @@ use crate::rig::{Rig, shipped};
 /// and the journal has one finished entry for every step.
 #[test]
 fn a_box_is_assembled_whatever_the_seed() {
-    let steps = shipped().product.parts.len();
-    for seed in 1..=20 {
-        let mut rig = Rig::new(1, seed);
+    for (product, seed) in (1..=20).map(|seed| ("s471", seed)).chain((1..=10).map(|seed| ("s472", seed))) {
+        let steps = shipped(product).product.parts.len();
+        let mut rig = Rig::of(product, 1, seed);
         let outcome = rig.finish();
         let summary = rig.summary();
-        assert_eq!(outcome, Outcome::Completed, "seed {seed}: {}", rig.tail());
-        assert_eq!(summary.boxes_completed, 1, "seed {seed}: {summary:?}");
-        assert_eq!(summary.contacts, 0, "seed {seed}: {summary:?}");
-        assert!(summary.min_clearance_m.is_some_and(|clearance| clearance > 0.0), "seed {seed}: {summary:?}");
+        assert_eq!(outcome, Outcome::Completed, "{product}, seed {seed}: {}", rig.tail());
+        assert_eq!(summary.boxes_completed, 1, "{product}, seed {seed}: {summary:?}");
+        assert_eq!(summary.contacts, 0, "{product}, seed {seed}: {summary:?}");
+        assert!(
+            summary.min_clearance_m.is_some_and(|clearance| clearance > 0.0),
+            "{product}, seed {seed}: {summary:?}"
+        );
         let journal = rig.journal();
         let finished: BTreeSet<u32> = journal
             .iter()
             .filter(|entry| entry.state != StepState::Started && entry.state != StepState::Failed)
             .map(|entry| entry.step)
             .collect();
-        assert_eq!(finished.len(), steps, "seed {seed}: {journal:?}");
+        assert_eq!(finished.len(), steps, "{product}, seed {seed}: {journal:?}");
     }
 }
 

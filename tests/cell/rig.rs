@@ -17,15 +17,20 @@ pub(crate) struct Rig {
     _folder: tempfile::TempDir,
 }
 
-/// The shipped cell.
-pub(crate) fn shipped() -> Cell {
+/// The shipped cell, set up for a product.
+pub(crate) fn shipped(product: &str) -> Cell {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("config/cells/s471.toml");
-    Cell::load(&file, None).unwrap_or_else(|faults| panic!("{faults}"))
+    Cell::load(&file, Some(product)).unwrap_or_else(|faults| panic!("{faults}"))
 }
 
 impl Rig {
+    /// The shipped cell with the product its file names.
     pub(crate) fn new(boxes: u32, seed: u64) -> Self {
-        let cell = shipped();
+        Self::of("s471", boxes, seed)
+    }
+
+    pub(crate) fn of(product: &str, boxes: u32, seed: u64) -> Self {
+        let cell = shipped(product);
         let folder = tempfile::tempdir().expect("a temporary folder");
         let url = format!("sqlite://{}", folder.path().join("cell.db").display());
         let store = Store::open(&url).expect("an empty folder takes a database");
