@@ -7,7 +7,9 @@ use clap::Args;
 use comfy_table::{Table, presets};
 use serde_json::json;
 use tandem_config::Cell;
-use tandem_msg::{Coded, RoleStats};
+use tandem_cycle::Histogram;
+use tandem_cycle::stats::Snapshot;
+use tandem_msg::Coded;
 
 use super::progress::Screen;
 use super::{check, exit};
@@ -46,7 +48,7 @@ struct Ended {
     outcome: Outcome,
     summary: Summary,
     /// Health of the loops; none in lockstep, where nothing is late.
-    loops: Vec<RoleStats>,
+    loops: Vec<Snapshot>,
     restarts: u32,
 }
 
@@ -171,7 +173,7 @@ fn live(
 ) -> Result<Ended, Refusal> {
     let ended = live::run(cell, product, library, store, options, on_event)
         .map_err(|error| Refusal { message: error.to_string(), exit_code: error.exit_code() })?;
-    Ok(Ended { outcome: ended.outcome, summary: ended.summary, loops: ended.loops.to_vec(), restarts: ended.restarts })
+    Ok(Ended { outcome: ended.outcome, summary: ended.summary, loops: ended.loops, restarts: ended.restarts })
 }
 
 /// Prints the summary: the last line of `--json`, or a table.
@@ -199,32 +201,42 @@ fn report(args: &RunArgs, ended: &Ended, wall_time_s: f64, run: &str, store: &St
 }
 
 /// How a role's loop kept its time.
-fn loop_line(stats: &RoleStats) -> serde_json::Value {
-    let role = stats.role.get().map_or("unknown", Coded::name);
-    json!({"event": "loop", "role": role, "cycles": stats.cycles, "missed": stats.missed,
-        "lateness_max_us": stats.lateness_ns[1] / 1_000, "busy_max_us": stats.busy_ns[1] / 1_000,
-        "fifo": stats.fifo == 1, "memory_locked": stats.locked == 1})
+fn loop_line(of: &Snapshot) -> serde_json::Value {
+    let record = &of.record;
+    let role = of.role.get().map_or("unknown", Coded::name);
+    let quantiles = |histogram: &Histogram| {
+        let us = |q| histogram.quantile_ns(q) as f64 * 1e-3;
+        json!({"p50": us(0.5), "p99": us(0.99), "p99.9": us(0.999), "max": us(1.0)})
+    };
+    json!({"event": "loop", "role": role, "cycles": record.cycles, "missed": record.missed, "overruns": record.overruns,
+        "lateness_us": quantiles(&record.lateness), "busy_us": quantiles(&record.busy),
+        "fifo": of.obtained.priority, "memory_locked": of.obtained.locked})
 }
 
-fn loop_table(loops: &[RoleStats]) -> Table {
+fn loop_table(loops: &[Snapshot]) -> Table {
     let mut table = Table::new();
     table.load_style(presets::NOTHING).set_header([
         "loop",
         "cycles",
         "missed",
-        "latest wake-up",
-        "longest cycle",
+        "wake-up p99",
+        "latest",
+        "cycle p99",
+        "longest",
         "scheduling",
     ]);
-    for stats in loops {
+    for of in loops {
+        let record = &of.record;
         let ms = |ns: u64| format!("{:.2} ms", ns as f64 * 1e-6);
         table.add_row([
-            stats.role.get().map_or("unknown", Coded::name).to_owned(),
-            stats.cycles.to_string(),
-            stats.missed.to_string(),
-            ms(stats.lateness_ns[1]),
-            ms(stats.busy_ns[1]),
-            if stats.fifo == 1 { "realtime" } else { "normal" }.to_owned(),
+            of.role.get().map_or("unknown", Coded::name).to_owned(),
+            record.cycles.to_string(),
+            record.missed.to_string(),
+            ms(record.lateness.quantile_ns(0.99)),
+            ms(record.lateness.max_ns()),
+            ms(record.busy.quantile_ns(0.99)),
+            ms(record.busy.max_ns()),
+            if of.obtained.priority.is_some() { "realtime" } else { "normal" }.to_owned(),
         ]);
     }
     table

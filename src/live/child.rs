@@ -15,7 +15,7 @@ use super::shell::{Leaving, Shell};
 use super::{LiveError, rundir, signals};
 use crate::perception::Perception;
 use crate::plant::Plant;
-use crate::roles::{ControllerRole, PerceptionRole, PlantRole, service};
+use crate::roles::{ControllerRole, PerceptionRole, PlantRole};
 
 /// The roles that are processes of their own.
 pub(super) const CHILDREN: [Role; 3] = [Role::Plant, Role::Perception, Role::Controller];
@@ -62,7 +62,6 @@ fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, L
     let plant = Plant::new(cell, args.seed).map_err(refused(Role::Plant))?;
     let node = join(args.role, args.epoch, cell, instance)?;
     let (mut role, camera) = PlantRole::open_apart(&node, plant)?;
-    let stats = node.publisher(&service::stats(args.role))?;
     thread::scope(|scope| {
         let (ready, opened) = mpsc::channel();
         // Started before the loop is set up, whose processor and priority it must not inherit.
@@ -82,8 +81,11 @@ fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, L
             }
         });
         opened.recv().unwrap_or(Ok(()))?;
-        let shell = Shell::new(cell, args.role, stats)?;
-        let left = shell.run(|now| role.cycle(now));
+        let shell = Shell::new(cell, instance, args.role, args.epoch)?;
+        let left = shell.run(|now| {
+            role.cycle(now);
+            role.heard()
+        });
         // Ends the camera.
         drop(role);
         Ok(left)
@@ -94,8 +96,11 @@ fn perception(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leavi
     let perception = Perception::load(&cell.perception.model).map_err(refused(Role::Perception))?;
     let node = join(args.role, args.epoch, cell, instance)?;
     let mut role = PerceptionRole::open(&node, perception)?;
-    let shell = Shell::new(cell, args.role, node.publisher(&service::stats(args.role))?)?;
-    Ok(shell.run(|now| role.cycle(now)))
+    let shell = Shell::new(cell, instance, args.role, args.epoch)?;
+    Ok(shell.run(|now| {
+        role.cycle(now);
+        role.heard()
+    }))
 }
 
 fn controller(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {
@@ -103,8 +108,11 @@ fn controller(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leavi
     let controller = controller.map_err(refused(Role::Controller))?;
     let node = join(args.role, args.epoch, cell, instance)?;
     let mut role = ControllerRole::open(&node, controller)?;
-    let shell = Shell::new(cell, args.role, node.publisher(&service::stats(args.role))?)?;
-    Ok(shell.run(|now| role.cycle(now)))
+    let shell = Shell::new(cell, instance, args.role, args.epoch)?;
+    Ok(shell.run(|now| {
+        role.cycle(now);
+        role.heard()
+    }))
 }
 
 /// A place on the bus for one incarnation of a role.

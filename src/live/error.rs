@@ -43,6 +43,14 @@ pub enum LiveError {
         /// What is missing.
         denied: Denied,
     },
+    /// The file of a loop's statistics cannot be made.
+    #[error("statistics {path}: {cause}; is /dev/shm mounted and not full? `tandem doctor` says more")]
+    Statistics {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        cause: io::Error,
+    },
     /// A role refuses its files or parameters.
     #[error("{}: {cause}", role.name())]
     Build {

@@ -1,7 +1,7 @@
 //! Whether the roles of a cell live, by what is heard of them and of their processes.
 //!
 //! ```text
-//! Starting --stats of this incarnation--> Up --death, silence--> Lost --process started anew--> Starting
+//! Starting --word of this incarnation--> Up --death, silence--> Lost --process started anew--> Starting
 //! ```
 //! Two sources: the [`Warden`](super::warden) sees a process end; here is seen that
 //! one which lives says nothing. Silence is counted in cycles of the observer, not

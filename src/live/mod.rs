@@ -28,6 +28,7 @@ mod rundir;
 mod shell;
 pub mod signals;
 mod spawn;
+mod statistics;
 mod supervise;
 mod warden;
 
@@ -35,6 +36,7 @@ pub use child::{RoleArgs, role};
 pub use error::LiveError;
 pub(crate) use rundir::prepare_base;
 pub use rundir::{base, dead_cells};
+pub use statistics::{RunningCell, running_cells};
 pub use supervise::Ended;
 
 use std::sync::mpsc;

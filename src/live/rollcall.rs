@@ -3,9 +3,8 @@
 use std::sync::mpsc;
 use std::time::Duration;
 
-use tandem_bus::Latest;
 use tandem_config::Cell;
-use tandem_msg::{Coded, Header, Role, RoleStats, Stamp};
+use tandem_msg::{Coded, Header, Role, Stamp};
 
 use super::LiveError;
 use super::child::CHILDREN;
@@ -25,7 +24,6 @@ const SILENCE_PERIODS: u32 = 10;
 /// The other roles as the supervisor's thread sees them, in the order of [`CHILDREN`].
 pub(super) struct RollCall {
     health: [Health; 3],
-    stats: [Latest<RoleStats>; 3],
     /// All have been up at once.
     ready: bool,
     restarts: u32,
@@ -37,14 +35,14 @@ pub(super) struct RollCall {
 
 impl RollCall {
     /// Nobody is there yet.
-    pub(super) fn new(stats: [Latest<RoleStats>; 3], cell: &Cell) -> Self {
+    pub(super) fn new(cell: &Cell) -> Self {
         let period = cell.timing.of(Role::Supervisor).period;
         let health = CHILDREN.map(|role| {
             let silence = if role == Role::Perception { SILENCE_PERCEPTION } else { SILENCE };
             let silence = silence.max(cell.timing.of(role).period * SILENCE_PERIODS);
             Health::new(Patience::new(silence, STARTING, period))
         });
-        Self { health, stats, ready: false, restarts: 0, last_words: String::new(), gone: None }
+        Self { health, ready: false, restarts: 0, last_words: String::new(), gone: None }
     }
 
     /// One cycle: takes in what the warden reports and whether the roles' streams
@@ -121,15 +119,6 @@ impl RollCall {
     /// Processes that were started anew.
     pub(super) fn restarts(&self) -> u32 {
         self.restarts
-    }
-
-    /// The last report of each loop by role code; `own` is the supervisor's.
-    pub(super) fn loops(&mut self, own: RoleStats) -> [RoleStats; 4] {
-        let mut loops = [own; 4];
-        for (role, stats) in CHILDREN.into_iter().zip(&mut self.stats) {
-            loops[role as usize] = *tandem_bus::Read::read(stats);
-        }
-        loops
     }
 }
 

@@ -78,10 +78,19 @@ pub(super) fn instance_at(path: &Path) -> Result<Instance, BusError> {
 
 /// Run directories of cells that are dead: their supervisor was killed.
 pub fn dead_cells() -> Vec<PathBuf> {
+    named().into_iter().filter(|path| is_dead(path)).collect()
+}
+
+/// Run directories of cells that are running.
+pub(super) fn living() -> Vec<PathBuf> {
+    named().into_iter().filter(|path| !is_dead(path)).collect()
+}
+
+fn named() -> Vec<PathBuf> {
     let entries = fs::read_dir(base()).into_iter().flatten().flatten();
     // A name with a dot is one that is just being made.
     let named = entries.filter(|entry| !entry.file_name().as_encoded_bytes().starts_with(b"."));
-    named.map(|entry| entry.path()).filter(|path| is_dead(path)).collect()
+    named.map(|entry| entry.path()).collect()
 }
 
 /// Removes what dead cells of this user left. What cannot be removed is left to `tandem doctor`.

@@ -1,23 +1,25 @@
 //! The loop around a role's cycle, the same for all of them.
 //!
 //! What differs between roles is what a cycle reads, does and writes, and that is
-//! a closure. What is the same is here: the grid, the record of the loop, the
-//! report on it ten times a second, and when to leave.
+//! a closure. What is the same is here: the grid, the statistics of the loop, and
+//! when to leave.
 
 use std::io::{self, Write as _};
 use std::time::Duration;
 
 use rustix::process::{Pid, getppid};
-use tandem_bus::{Publisher, Write as _};
-use tandem_config::{Cell, Policy, Schedule};
+use tandem_bus::Instance;
+use tandem_config::{Cell, Policy};
 use tandem_cycle::setup::{self, Granted, Wish};
-use tandem_cycle::{FixedRate, Grid, Monotonic};
-use tandem_msg::{Coded, Role, RoleStats, Stamp};
+use tandem_cycle::stats::Writer;
+use tandem_cycle::{Clock, FixedRate, Grid, Monotonic};
+use tandem_msg::{Coded, Header, Role, Stamp};
 
-use super::{LiveError, signals};
+use super::{LiveError, signals, statistics};
+use crate::roles::service;
 
-/// Between two reports.
-const REPORT: Duration = Duration::from_millis(100);
+/// Between two looks at who the parent is.
+const PARENT_CHECK: Duration = Duration::from_millis(100);
 
 /// Why a loop was left.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,33 +32,45 @@ pub(super) enum Leaving {
 
 /// One role's loop.
 pub(super) struct Shell {
-    role: Role,
-    rate: FixedRate<Monotonic>,
-    granted: Granted,
-    stats: Publisher<RoleStats>,
-    report_at: Stamp,
+    rate: FixedRate<Monotonic, Writer>,
     parent: Option<Pid>,
+    check_at: Stamp,
 }
 
 impl Shell {
     /// Sets the calling thread up as the cell file asks; says on standard error what the host does not grant.
-    pub(super) fn new(cell: &Cell, role: Role, stats: Publisher<RoleStats>) -> Result<Self, LiveError> {
-        let grid = grid(cell.timing.of(role), role)?;
+    pub(super) fn new(cell: &Cell, instance: &Instance, role: Role, epoch: u64) -> Result<Self, LiveError> {
+        let schedule = cell.timing.of(role);
+        let grid = Grid::new(schedule.period, schedule.phase).map_err(|cause| LiveError::Schedule { role, cause })?;
         let granted = granted(cell, role)?;
         tell(role, &granted);
-        let rate = FixedRate::new(grid, Monotonic);
-        Ok(Self { role, rate, granted, stats, report_at: Stamp(0), parent: getppid() })
+        let path = statistics::file(instance, role);
+        let now = Monotonic.now();
+        let record = Writer::create(&path, role, epoch, &grid, service::inputs(role), &granted, now);
+        let record = record.map_err(|cause| LiveError::Statistics { path, cause })?;
+        Ok(Self { rate: FixedRate::recording_in(record, grid, Monotonic), parent: getppid(), check_at: Stamp(0) })
     }
 
-    /// Runs `cycle` on every grid point until there is a reason to leave.
-    pub(super) fn run(mut self, mut cycle: impl FnMut(Stamp)) -> Leaving {
+    /// Waits for the next grid point: the "now" of the cycle.
+    pub(super) fn wait(&mut self) -> Stamp {
+        self.rate.wait().now
+    }
+
+    /// Records how old the inputs were that the cycle at `now` has read, by their headers.
+    pub(super) fn heard(&self, now: Stamp, inputs: &[Header]) {
+        for (index, header) in inputs.iter().enumerate().filter(|(_, header)| header.heard()) {
+            self.rate.recorder().age(index, now.0.saturating_sub(header.stamp.0));
+        }
+    }
+
+    /// Runs `cycle` on every grid point until there is a reason to leave. It answers with what it has heard.
+    pub(super) fn run<const N: usize>(mut self, mut cycle: impl FnMut(Stamp) -> [Header; N]) -> Leaving {
         loop {
-            let now = self.rate.wait().now;
-            cycle(now);
-            if now >= self.report_at {
-                self.report_at = now.after(REPORT);
-                // A lost report is followed by the next; the supervisor watches their stamps.
-                let _ = self.stats.publish(now, &stats(self.role, &self.rate, &self.granted));
+            let now = self.wait();
+            let heard = cycle(now);
+            self.heard(now, &heard);
+            if now >= self.check_at {
+                self.check_at = now.after(PARENT_CHECK);
                 if getppid() != self.parent {
                     return Leaving::Orphaned;
                 }
@@ -68,13 +82,8 @@ impl Shell {
     }
 }
 
-/// The grid of a role.
-pub(super) fn grid(schedule: Schedule, role: Role) -> Result<Grid, LiveError> {
-    Grid::new(schedule.period, schedule.phase).map_err(|cause| LiveError::Schedule { role, cause })
-}
-
 /// What the host grants the calling thread for its role.
-pub(super) fn granted(cell: &Cell, role: Role) -> Result<Granted, LiveError> {
+fn granted(cell: &Cell, role: Role) -> Result<Granted, LiveError> {
     let index = role as usize;
     let priority = cell.realtime.priority[index];
     let wish = Wish {
@@ -91,7 +100,7 @@ pub(super) fn granted(cell: &Cell, role: Role) -> Result<Granted, LiveError> {
 }
 
 /// Says on standard error what is degraded, and how to mend it.
-pub(super) fn tell(role: Role, granted: &Granted) {
+fn tell(role: Role, granted: &Granted) {
     for notice in granted.notices.iter() {
         // Standard error may be closed; `tandem doctor` says the same.
         let _ = match role {
@@ -99,21 +108,5 @@ pub(super) fn tell(role: Role, granted: &Granted) {
             Role::Supervisor => writeln!(io::stderr(), "{}: {notice}", role.name()),
             _ => writeln!(io::stderr(), "{notice}"),
         };
-    }
-}
-
-/// The report on a loop.
-pub(super) fn stats(role: Role, rate: &FixedRate<Monotonic>, granted: &Granted) -> RoleStats {
-    let record = rate.record();
-    RoleStats {
-        role: role.into(),
-        fifo: granted.priority.is_some().into(),
-        locked: granted.locked.into(),
-        cpu: granted.cpu.unwrap_or(u32::MAX),
-        cycles: record.cycles,
-        missed: record.missed,
-        lateness_ns: [record.lateness_last_ns, record.lateness.max_ns()],
-        busy_ns: [record.busy_last_ns, record.busy.max_ns()],
-        ..RoleStats::default()
     }
 }

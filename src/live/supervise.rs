@@ -3,17 +3,18 @@
 use std::sync::mpsc;
 use std::time::Duration;
 
-use tandem_bus::{Instance, Node, Write as _};
+use tandem_bus::{Instance, Node};
 use tandem_config::Cell;
-use tandem_cycle::{FixedRate, Monotonic};
-use tandem_msg::{Role, RoleStats, Stamp};
+use tandem_cycle::stats::{Reader, Snapshot};
+use tandem_msg::{Coded, Role, Stamp};
 
-use super::child::{CHILDREN, join};
+use super::child::join;
 use super::journal::Journal;
 use super::rollcall::RollCall;
+use super::shell::Shell;
 use super::warden::{Orders, Report};
-use super::{LiveError, shell, signals};
-use crate::roles::{SupervisorRole, Surroundings, service};
+use super::{LiveError, signals, statistics};
+use crate::roles::{SupervisorRole, Surroundings};
 use crate::supervisor::{Event, Outcome, Summary, Supervisor};
 
 /// A measured state older than this does not say that the arm stands.
@@ -34,8 +35,8 @@ pub struct Ended {
     pub outcome: Outcome,
     /// Its numbers.
     pub summary: Summary,
-    /// Health of each loop at the end, by role code.
-    pub loops: [RoleStats; 4],
+    /// Statistics of the loops at the end.
+    pub loops: Vec<Snapshot>,
     /// Role processes that had to be started anew.
     pub restarts: u32,
 }
@@ -62,21 +63,14 @@ impl Watch<'_> {
     pub(super) fn run(mut self, supervisor: Supervisor) -> Result<Ended, LiveError> {
         let node = join(Role::Supervisor, 1, self.cell, self.instance)?;
         let mut role = SupervisorRole::open(&node, supervisor)?;
-        let mut own_stats = node.publisher(&service::stats(Role::Supervisor))?;
-        let [plant, perception, controller] = CHILDREN;
-        let stats = |role| node.latest(&service::stats(role));
-        let stats = [stats(plant)?, stats(perception)?, stats(controller)?];
-        let mut roles = RollCall::new(stats, self.cell);
-
-        let granted = shell::granted(self.cell, Role::Supervisor)?;
-        shell::tell(Role::Supervisor, &granted);
-        let grid = shell::grid(self.cell.timing.of(Role::Supervisor), Role::Supervisor)?;
-        let mut rate = FixedRate::new(grid, Monotonic);
+        let mut roles = RollCall::new(self.cell);
+        let mut shell = Shell::new(self.cell, self.instance, Role::Supervisor, 1)?;
         let mut asked_since = None;
         let mut ending: Option<Ending> = None;
         loop {
-            let now = rate.wait().now;
-            roles.call(now, &self.reports, &role.heard(), self.orders);
+            let now = shell.wait();
+            let [plant, perception, controller, ..] = role.heard();
+            roles.call(now, &self.reports, &[plant, perception, controller], self.orders);
             if let Some(error) = roles.failed_to_start() {
                 return Err(error);
             }
@@ -99,15 +93,25 @@ impl Watch<'_> {
             } else if ending.is_none() {
                 ending = overdue(now, asked_since, &roles).map(|outcome| Ending { outcome, since: now });
             }
-            let _ = own_stats.publish(now, &shell::stats(Role::Supervisor, &rate, &granted));
+            shell.heard(now, &role.heard());
             if let Some(end) = &ending
                 && self.may_leave(now, end, &role)
             {
-                let loops = roles.loops(shell::stats(Role::Supervisor, &rate, &granted));
+                let loops = self.loops();
                 let summary = role.summary();
                 return Ok(Ended { outcome: end.outcome.clone(), summary, loops, restarts: roles.restarts() });
             }
         }
+    }
+
+    /// Statistics of the loops, as far as they can be read.
+    fn loops(&self) -> Vec<Snapshot> {
+        let read = |role: &Role| {
+            let mut snapshot = Snapshot::default();
+            let reader = Reader::open(&statistics::file(self.instance, *role)).ok()?;
+            reader.read(&mut snapshot).ok().map(|()| snapshot)
+        };
+        Role::ALL.iter().filter_map(read).collect()
     }
 
     /// Whether the arm stands and the journal is durable, or they have had their time.

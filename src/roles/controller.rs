@@ -2,7 +2,7 @@
 
 use tandem_bus::{Read, Write};
 use tandem_controller::{Controller, ControllerInputs, ControllerOutputs};
-use tandem_msg::{HumanState, JointCommand, JointState, MotionStatus, MotionTask, Scene, Stamp};
+use tandem_msg::{Header, HumanState, JointCommand, JointState, MotionStatus, MotionTask, Scene, Stamp};
 
 use super::{Ports, service};
 
@@ -49,6 +49,11 @@ impl<P: Ports> ControllerRole<P> {
         self.controller.cycle(now, &inputs, &mut self.outputs);
         self.unsent += u64::from(self.command.publish(now, &self.outputs.command).is_err());
         self.unsent += u64::from(self.status.publish(now, &self.outputs.status).is_err());
+    }
+
+    /// Header of the last value heard of each input, in the order of [`service::inputs`].
+    pub fn heard(&self) -> [Header; 4] {
+        [self.arm.held().header, self.human.held().header, self.scene.held().header, self.task.held().header]
     }
 
     /// Messages that reached nobody because the bus had no room.

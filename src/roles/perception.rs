@@ -1,7 +1,7 @@
 //! Perception and its ports.
 
 use tandem_bus::{Read, Write};
-use tandem_msg::{Feature, PointCloud, Stamp};
+use tandem_msg::{Feature, Header, PointCloud, Stamp};
 
 use super::{Ports, service};
 use crate::perception::Perception;
@@ -34,6 +34,11 @@ impl<P: Ports> PerceptionRole<P> {
     pub fn cycle(&mut self, now: Stamp) {
         self.perception.cycle(now, self.cloud.read(), &mut self.seen);
         self.unsent += u64::from(self.feature.publish(now, &self.seen).is_err());
+    }
+
+    /// Header of the last value heard of each input, in the order of [`service::inputs`].
+    pub fn heard(&self) -> [Header; 1] {
+        [self.cloud.held().header]
     }
 
     /// Messages that reached nobody because the bus had no room.

@@ -4,7 +4,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use tandem_bus::{Read, Write};
 use tandem_msg::{
-    CellRequest, CellState, HumanState, JointCommand, JointState, OperatorEvent, PointCloud, Prompt, Stamp,
+    CellRequest, CellState, Header, HumanState, JointCommand, JointState, OperatorEvent, PointCloud, Prompt, Stamp,
 };
 
 use super::{Ports, service};
@@ -114,6 +114,11 @@ impl<P: Ports> PlantRole<P> {
             });
         }
         self.unsent += unsent;
+    }
+
+    /// Header of the last value heard of each input, in the order of [`service::inputs`].
+    pub fn heard(&self) -> [Header; 3] {
+        [self.command.held().header, self.request.held().header, self.prompt.held().header]
     }
 
     /// Messages that reached nobody because the bus had no room.

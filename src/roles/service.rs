@@ -1,6 +1,6 @@
 //! Names of the services of a cell.
 
-use tandem_msg::{Coded, Role};
+use tandem_msg::Role;
 
 /// `JointState`, plant to controller and supervisor.
 pub const ARM_STATE: &str = "arm/state";
@@ -27,7 +27,12 @@ pub const REQUEST: &str = "supervisor/request";
 /// `MotionStatus`, controller to supervisor.
 pub const STATUS: &str = "controller/status";
 
-/// `RoleStats`, each role to supervisor: the health of its loop.
-pub fn stats(role: Role) -> String {
-    format!("{}/stats", role.name())
+/// What a role reads, in the order in which it says what it has heard.
+pub const fn inputs(role: Role) -> &'static [&'static str] {
+    match role {
+        Role::Plant => &[ARM_COMMAND, REQUEST, PROMPT],
+        Role::Perception => &[CLOUD],
+        Role::Supervisor => &[ARM_STATE, FEATURE, STATUS, HUMAN, OPERATOR, CELL],
+        Role::Controller => &[ARM_STATE, HUMAN, SCENE, TASK],
+    }
 }

@@ -83,9 +83,17 @@ impl<P: Ports> SupervisorRole<P> {
         &mut self.outputs
     }
 
-    /// Header of the last value heard of each other role: plant, perception, controller.
-    pub fn heard(&self) -> [Header; 3] {
-        [self.arm.held().header, self.feature.held().header, self.status.held().header]
+    /// Header of the last value heard of each input, in the order of [`service::inputs`]:
+    /// first the arm's state, the feature and the controller's status.
+    pub fn heard(&self) -> [Header; 6] {
+        [
+            self.arm.held().header,
+            self.feature.held().header,
+            self.status.held().header,
+            self.human.held().header,
+            self.operator.held().header,
+            self.cell.held().header,
+        ]
     }
 
     /// The measured state of the arm as it was last read.

@@ -1,8 +1,10 @@
 //! The loop itself.
 
+use core::borrow::Borrow;
+
 use tandem_msg::Stamp;
 
-use crate::{Clock, Grid, Record};
+use crate::{Clock, Grid, Record, SharedRecord};
 
 /// One wake-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,20 +29,27 @@ pub struct Tick {
 /// cycles    ##    ##########        ##    ##
 ///                       missed ^ 1
 /// ```
-pub struct FixedRate<C> {
+pub struct FixedRate<C, R = SharedRecord> {
     clock: C,
     grid: Grid,
     /// The point of the last cycle; none before the first.
     last: Option<Stamp>,
     woken: Stamp,
     /// Lateness and busy time are recorded from here on.
-    record: Record,
+    record: R,
 }
 
 impl<C: Clock> FixedRate<C> {
     /// A loop that has not run yet. Its first cycle stands for the next grid point.
     pub fn new(grid: Grid, clock: C) -> Self {
-        Self { clock, grid, last: None, woken: Stamp(0), record: Record::default() }
+        Self::recording_in(SharedRecord::default(), grid, clock)
+    }
+}
+
+impl<C: Clock, R: Borrow<SharedRecord>> FixedRate<C, R> {
+    /// The same, with its record where others can read it.
+    pub fn recording_in(record: R, grid: Grid, clock: C) -> Self {
+        Self { clock, grid, last: None, woken: Stamp(0), record }
     }
 
     /// Ends the cycle in progress, if any, and waits for the next grid point.
@@ -67,22 +76,24 @@ impl<C: Clock> FixedRate<C> {
 
     fn end_cycle(&mut self, last: Stamp, finished: Stamp) {
         let busy = finished.0.saturating_sub(self.woken.0);
-        self.record.busy_last_ns = busy;
-        self.record.busy.record(busy);
-        self.record.overruns += u64::from(finished > self.grid.next(last));
+        self.record.borrow().cycle_ended(busy, finished > self.grid.next(last));
     }
 
     fn begin_cycle(&mut self, now: Stamp, woken: Stamp, lateness: u64, missed: u64) {
         self.last = Some(now);
         self.woken = woken;
-        self.record.cycles += 1;
-        self.record.missed += missed;
-        self.record.lateness_last_ns = lateness;
-        self.record.lateness.record(lateness);
+        self.record.borrow().cycle_began(lateness, missed);
     }
 
-    /// What the loop found out about itself so far.
-    pub fn record(&self) -> &Record {
+    /// What the loop found out about itself so far: a copy, not for a cycle.
+    pub fn record(&self) -> Record {
+        let mut copy = Record::default();
+        self.record.borrow().copy_to(&mut copy);
+        copy
+    }
+
+    /// Where it records.
+    pub fn recorder(&self) -> &R {
         &self.record
     }
 
@@ -130,7 +141,7 @@ mod tests {
             ticks.push(rate.wait());
             rate.clock.now += busy;
         }
-        (ticks, rate.record.clone())
+        (ticks, rate.record())
     }
 
     /// A cycle that takes 2.5 periods costs exactly two grid points, and the phase stays.

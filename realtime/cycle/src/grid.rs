@@ -49,6 +49,11 @@ impl Grid {
         Duration::from_nanos(self.period_ns)
     }
 
+    /// Offset of the points on the clock, below the period.
+    pub fn phase(&self) -> Duration {
+        Duration::from_nanos(self.phase_ns)
+    }
+
     /// The last point at or before `t`; the very first one if there is none.
     pub fn at_or_before(&self, t: Stamp) -> Stamp {
         let into = t.0.saturating_sub(self.phase_ns);

@@ -1,4 +1,9 @@
 //! Durations by size, in fixed memory.
+//!
+//! A loop writes a [`SharedHistogram`], which may lie in memory other processes
+//! read; a reader works with a [`Histogram`], a copy of it.
+
+use core::sync::atomic::{AtomicU64, Ordering};
 
 /// Buckets in each octave: a value is known to 1/32 of itself.
 const SUB_BITS: u32 = 5;
@@ -43,6 +48,21 @@ impl Histogram {
         self.max_ns
     }
 
+    /// Adds what another one has counted.
+    pub fn add(&mut self, other: &Self) {
+        for (count, more) in self.counts.iter_mut().zip(&other.counts) {
+            *count += more;
+        }
+        self.total += other.total;
+        self.max_ns = self.max_ns.max(other.max_ns);
+    }
+
+    /// The buckets that hold something: largest value, nanoseconds, and count.
+    pub fn buckets(&self) -> impl Iterator<Item = (u64, u64)> {
+        let held = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
+        held.map(|(index, count)| (if index < BUCKETS - 1 { upper(index) } else { self.max_ns }, *count))
+    }
+
     /// The duration that the share `quantile` (0 to 1) of all does not exceed, nanoseconds.
     pub fn quantile_ns(&self, quantile: f64) -> u64 {
         let rank = (quantile.clamp(0.0, 1.0) * self.total as f64).ceil().max(1.0) as u64;
@@ -55,6 +75,57 @@ impl Histogram {
         }
         self.max_ns
     }
+}
+
+/// A [`Histogram`] that one loop writes while others read it.
+#[repr(C)]
+pub struct SharedHistogram {
+    counts: [AtomicU64; BUCKETS],
+    max_ns: AtomicU64,
+}
+
+impl Default for SharedHistogram {
+    fn default() -> Self {
+        Self { counts: [const { AtomicU64::new(0) }; BUCKETS], max_ns: AtomicU64::new(0) }
+    }
+}
+
+impl SharedHistogram {
+    /// Counts one duration, nanoseconds. By the one writer only.
+    ///
+    /// # Realtime
+    /// Constant time: loads and stores, no locked instruction, no system call.
+    pub fn record(&self, value_ns: u64) {
+        raise(&self.counts[bucket(value_ns)], 1);
+        if value_ns > self.max_ns.load(Ordering::Relaxed) {
+            self.max_ns.store(value_ns, Ordering::Relaxed);
+        }
+    }
+
+    /// The largest, nanoseconds; 0 when nothing was counted.
+    pub fn max_ns(&self) -> u64 {
+        self.max_ns.load(Ordering::Relaxed)
+    }
+
+    /// What has been counted so far; a duration that is just being counted may be missing.
+    pub fn copy_to(&self, copy: &mut Histogram) {
+        copy.total = 0;
+        for (to, from) in copy.counts.iter_mut().zip(&self.counts) {
+            *to = from.load(Ordering::Relaxed);
+            copy.total += *to;
+        }
+        copy.max_ns = self.max_ns.load(Ordering::Relaxed);
+    }
+
+    /// Forgets everything. By the one writer only.
+    pub fn clear(&self) {
+        self.counts.iter().chain([&self.max_ns]).for_each(|count| count.store(0, Ordering::Relaxed));
+    }
+}
+
+/// Adds to a number that only the caller writes.
+pub(crate) fn raise(number: &AtomicU64, by: u64) {
+    number.store(number.load(Ordering::Relaxed).wrapping_add(by), Ordering::Relaxed);
 }
 
 /// Below 32 each value has its own bucket; above, 32 buckets an octave.
@@ -114,6 +185,22 @@ mod tests {
             let found = histogram.quantile_ns(q);
             prop_assert!(found >= exact && found - exact <= exact / 32, "{found} for {exact}");
             prop_assert_eq!(histogram.quantile_ns(1.0), values[values.len() - 1]);
+        }
+
+        /// What is read of a shared histogram is what a plain one would hold, and two halves make the whole.
+        #[test]
+        fn a_shared_one_counts_the_same(values in prop::collection::vec(any::<u64>().prop_map(|v| v >> (v % 64)), 1..200), at in 0usize..200) {
+            let (mut plain, mut copy, mut sum) = (Histogram::default(), Histogram::default(), Histogram::default());
+            values.iter().for_each(|value| plain.record(*value));
+            for half in [&values[..at.min(values.len())], &values[at.min(values.len())..]] {
+                let shared = SharedHistogram::default();
+                half.iter().for_each(|value| shared.record(*value));
+                shared.copy_to(&mut copy);
+                sum.add(&copy);
+            }
+            prop_assert_eq!((sum.total(), sum.max_ns()), (plain.total(), plain.max_ns()));
+            prop_assert!(sum.buckets().eq(plain.buckets()));
+            prop_assert_eq!(sum.buckets().map(|(_, count)| count).sum::<u64>(), values.len() as u64);
         }
 
         /// Every value lies in a bucket whose upper end is not below it and whose predecessor's is.

@@ -6,6 +6,7 @@
 //! Record    what it found: lateness, time in the cycle, missed grid points
 //! setup     what the host granted: SCHED_FIFO, affinity, locked memory, timer slack
 //! guard     counts what a cycle allocates
+//! stats     all of this in shared memory, for whoever wants to look
 //! ```
 //!
 //! This crate is where the loop sleeps and reads the clock, so that nothing else
@@ -18,9 +19,10 @@ pub mod guard;
 mod histogram;
 mod record;
 pub mod setup;
+pub mod stats;
 
 pub use clock::{Clock, Monotonic};
 pub use fixed_rate::{FixedRate, Tick};
 pub use grid::{Grid, GridError};
-pub use histogram::Histogram;
-pub use record::Record;
+pub use histogram::{Histogram, SharedHistogram};
+pub use record::{Record, SharedRecord};

@@ -80,6 +80,11 @@ impl Instance {
         format!("{FAMILY}{}{END}", self.id)
     }
 
+    /// Where a shared-memory file of this instance lies that is not the bus's own; removed with the instance.
+    pub fn shared_file(&self, name: &str) -> PathBuf {
+        Path::new(SHARED_MEMORY).join(format!("{}{name}", self.prefix()))
+    }
+
     /// The whole configuration of iceoryx2 for this instance; nothing is left to files or defaults that matter.
     pub(crate) fn config(&self) -> Config {
         // Our errors carry what matters; upstream's log would write into a cycle.

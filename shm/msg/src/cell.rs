@@ -158,28 +158,3 @@ coded! {
         Controller = 3, "controller";
     }
 }
-
-/// Health of one role's loop, role to supervisor.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[repr(C)]
-pub struct RoleStats {
-    /// Header.
-    pub header: Header,
-    /// Who speaks.
-    pub role: Code<Role>,
-    /// 1 when the loop runs under SCHED_FIFO.
-    pub fifo: u32,
-    /// 1 when memory is locked.
-    pub locked: u32,
-    /// Processor the loop is pinned to, or `u32::MAX`.
-    pub cpu: u32,
-    /// Cycles run.
-    pub cycles: u64,
-    /// Grid points missed.
-    pub missed: u64,
-    /// Wake-up lateness, nanoseconds: last, largest.
-    pub lateness_ns: [u64; 2],
-    /// Time in the cycle, nanoseconds: last, largest.
-    pub busy_ns: [u64; 2],
-}
-message!(RoleStats, 96);

@@ -23,9 +23,7 @@ mod task;
 pub use arm::{
     EffectorAction, EffectorCommand, EffectorPhase, EffectorState, JointCommand, JointState, PlantFault, Tool,
 };
-pub use cell::{
-    Answer, CellRequest, CellState, OperatorEvent, Prompt, PromptKind, RequestKind, RequestPhase, Role, RoleStats,
-};
+pub use cell::{Answer, CellRequest, CellState, OperatorEvent, Prompt, PromptKind, RequestKind, RequestPhase, Role};
 pub use coded::{Code, Coded};
 pub use geometry::{Capsule, Pose, SceneObject, ShapeKind};
 pub use header::{Freshness, Header, Message, Stamp, Suspect};

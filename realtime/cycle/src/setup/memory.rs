@@ -35,12 +35,13 @@ pub(super) fn locked_in_force() -> bool {
     locked.and_then(|rest| rest.split_whitespace().next()?.parse::<u64>().ok()).is_some_and(|kilobytes| kilobytes > 0)
 }
 
-/// Touches the stack ahead of its use.
+/// Touches the stack ahead of its use; answers how much of it, bytes.
 #[inline(never)]
-pub(super) fn touch_stack() {
+pub(super) fn touch_stack() -> u64 {
     let mut stack = [0_u8; STACK];
     for page in (0..STACK).step_by(PAGE) {
         stack[page] = 1;
     }
     core::hint::black_box(&stack);
+    STACK as u64
 }

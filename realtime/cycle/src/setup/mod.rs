@@ -42,6 +42,10 @@ pub struct Granted {
     pub cpu: Option<u32>,
     /// Whether present and future memory of the process is locked.
     pub locked: bool,
+    /// Stack that was touched beforehand, bytes.
+    pub prefaulted: u64,
+    /// What `/dev/cpu_dma_latency` is held at, microseconds; none when it is not held.
+    pub dma_latency_us: Option<u64>,
     /// How late a timer may fire, nanoseconds; 0 under SCHED_FIFO.
     pub timer_slack_ns: u64,
     /// What was asked for and not granted.
@@ -77,13 +81,13 @@ pub fn acquire(wish: &Wish) -> Result<Granted, Denied> {
     if let Some(priority) = wish.priority {
         notices.add(scheduling::fifo(priority));
     }
-    if wish.lock_memory {
-        memory::touch_stack();
-    }
+    let prefaulted = if wish.lock_memory { memory::touch_stack() } else { 0 };
     let granted = Granted {
         priority: scheduling::fifo_in_force(),
         cpu: scheduling::bound_to(),
         locked: wish.lock_memory && memory::locked_in_force(),
+        prefaulted,
+        dma_latency_us: None,
         timer_slack_ns: scheduling::timer_slack_ns(),
         notices,
     };
