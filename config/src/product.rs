@@ -4,7 +4,7 @@ use crate::body::{Body, FeatureGeometry};
 use crate::fault::Fault;
 use crate::layout::Layout;
 use crate::read::{Bound, Document, Reading, Table, bound};
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::Isometry3;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
@@ -69,15 +69,6 @@ pub struct Part {
     pub view_turn: f64,
     /// Indices of the parts that must sit before it.
     pub after: Vec<usize>,
-}
-
-impl Part {
-    /// Where the camera stands to look at the feature from `distance` metres; z along the view.
-    pub fn part_from_camera(&self, distance: f64) -> Isometry3<f64> {
-        let turn = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), self.view_turn);
-        let tilt = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI - self.view_tilt);
-        self.part_from_feature * turn * tilt * Translation3::new(0.0, 0.0, -distance)
-    }
 }
 
 /// A product: part types in the order in which a box is assembled.
