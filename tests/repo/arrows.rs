@@ -10,7 +10,11 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("realtime/kinematics", &[]),
     ("realtime/cycle", &["tandem-msg"]),
     ("realtime/clearance", &["tandem-msg", "tandem-kinematics"]),
-    ("realtime/controller", &["tandem-msg", "tandem-trajectory", "tandem-kinematics", "tandem-clearance"]),
+    ("realtime/planner", &["tandem-kinematics", "tandem-clearance"]),
+    (
+        "realtime/controller",
+        &["tandem-msg", "tandem-trajectory", "tandem-kinematics", "tandem-clearance", "tandem-planner"],
+    ),
     ("config", &["tandem-msg", "tandem-kinematics", "tandem-clearance", "tandem-controller"]),
     ("benches/peers", &[]),
 ];
