@@ -30,7 +30,7 @@ pub(super) fn back_from(base_from_tcp: &Isometry3<f64>, distance: f64) -> Isomet
 pub(super) fn attached(part: &Part) -> AttachedPart {
     AttachedPart {
         present: 1,
-        reserved: 0,
+        shape: 0,
         half_extents: part.half_extents,
         tcp_from_part: pose_of(&part.part_from_grasp.inverse()),
         mass: part.mass,

@@ -1,13 +1,19 @@
-//! The arm as capsules, and which of its links are checked against each other.
+//! The arm as capsules or hulls, and which of its links are checked against each other.
 
 use core::fmt;
 
+use nalgebra::Vector3;
 use tandem_kinematics::JOINTS_MAX;
+
+use crate::kernel::point_to_segment;
+use crate::shapes::Shapes;
 
 /// Capsules an arm has room for.
 pub const LINK_CAPSULES_MAX: usize = 24;
 /// Pairs of capsules that are checked against each other.
 pub const SELF_PAIRS_MAX: usize = 192;
+/// How far a hull may reach out of its capsule, metres: the rounding of files.
+pub(crate) const HULL_OUTSIDE: f64 = 1e-6;
 
 /// A sphere swept along a segment that moves with a link.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -47,6 +53,20 @@ pub enum BodyError {
         /// Its radius.
         radius: f64,
     },
+    /// The shape that shall stand for a capsule is no registered hull.
+    NoSuchHull {
+        /// Index of the capsule.
+        index: usize,
+        /// Number of the shape.
+        shape: u32,
+    },
+    /// A hull reaches out of the capsule that it stands for.
+    HullOutside {
+        /// Index of the capsule.
+        index: usize,
+        /// How far, metres.
+        outside: f64,
+    },
 }
 
 impl fmt::Display for BodyError {
@@ -62,6 +82,12 @@ impl fmt::Display for BodyError {
             Self::Capsule { index, radius } => {
                 write!(f, "capsule {index}: radius = {radius} m, allowed above 0, with ends that are finite")
             }
+            Self::NoSuchHull { index, shape } => {
+                write!(f, "capsule {index}: shape {shape} stands for it, which is no registered hull")
+            }
+            Self::HullOutside { index, outside } => {
+                write!(f, "capsule {index}: the hull that stands for it reaches {outside} m out of it, allowed 1e-6")
+            }
         }
     }
 }
@@ -73,6 +99,8 @@ impl core::error::Error for BodyError {}
 pub struct ArmBody {
     capsules: [LinkCapsule; LINK_CAPSULES_MAX],
     capsule_count: usize,
+    /// Numbers of the hulls that stand for capsules; 0 for none.
+    hulls: [u32; LINK_CAPSULES_MAX],
     self_pairs: [[u8; 2]; SELF_PAIRS_MAX],
     self_pair_count: usize,
 }
@@ -90,6 +118,7 @@ impl ArmBody {
         let mut body = Self {
             capsules: [LinkCapsule::default(); LINK_CAPSULES_MAX],
             capsule_count: capsules.len(),
+            hulls: [0; LINK_CAPSULES_MAX],
             self_pairs: [[0; 2]; SELF_PAIRS_MAX],
             self_pair_count: 0,
         };
@@ -130,6 +159,41 @@ impl ArmBody {
     /// The capsules in use.
     pub fn capsules(&self) -> &[LinkCapsule] {
         &self.capsules[..self.capsule_count.min(LINK_CAPSULES_MAX)]
+    }
+
+    /// Lets a registered hull, in the frame of its link, stand for a capsule. The capsule must hold it: it
+    /// still tells quickly what is far off, and counts wherever a monitor knows no shapes.
+    ///
+    /// # Errors
+    /// A capsule that is not there. The hull is looked at by [`crate::Monitor::with_shapes`].
+    pub fn refine(&mut self, index: usize, shape: u32) -> Result<(), BodyError> {
+        if index >= self.capsule_count {
+            return Err(BodyError::NoSuchHull { index, shape });
+        }
+        self.hulls[index] = shape;
+        Ok(())
+    }
+
+    /// The hulls that stand for capsules, by the capsule's index.
+    pub(crate) fn hulls(&self) -> &[u32] {
+        &self.hulls[..self.capsule_count.min(LINK_CAPSULES_MAX)]
+    }
+
+    /// Whether every hull is registered and lies in its capsule.
+    pub(crate) fn check_hulls(&self, shapes: &Shapes) -> Result<(), BodyError> {
+        for (index, (shape, capsule)) in self.hulls().iter().zip(self.capsules()).enumerate() {
+            if *shape == 0 {
+                continue;
+            }
+            let hull = shapes.hull(*shape).ok_or(BodyError::NoSuchHull { index, shape: *shape })?;
+            let ends = capsule.ends.map(Vector3::from);
+            let from_axis = |point: Vector3<f64>| point_to_segment(&point, &ends).distance;
+            let outside = hull.points().map(from_axis).fold(0.0, f64::max) - capsule.radius;
+            if outside.is_nan() || outside > HULL_OUTSIDE {
+                return Err(BodyError::HullOutside { index, outside });
+            }
+        }
+        Ok(())
     }
 
     /// Pairs of indices into [`ArmBody::capsules`] that are checked against each other.

@@ -22,12 +22,18 @@
 
 mod body;
 mod kernel;
+mod lanes;
+mod mesh;
 mod monitor;
 mod obstacle;
+mod placed;
+mod shapes;
 pub mod ssm;
 mod sweep;
+mod targets;
 
 pub use body::{ArmBody, BodyError, LINK_CAPSULES_MAX, LinkCapsule, SELF_PAIRS_MAX};
 pub use monitor::{Clearance, Monitor, Separation};
 pub use obstacle::SceneFault;
+pub use shapes::{HULL_POINTS_MAX, MESH_TRIANGLES_MAX, ShapeError, Shapes};
 pub use sweep::{MotionSweep, Swept};

@@ -1,12 +1,18 @@
 //! The queries: one arm, one scene, one carried part, the people in view.
 
+#[allow(clippy::disallowed_types, reason = "shapes are shared out while starting")]
+use std::sync::Arc;
+
 use nalgebra::Vector3;
-use tandem_kinematics::{JOINTS_MAX, LinkPoses};
+use tandem_kinematics::LinkPoses;
 use tandem_msg::{AttachedPart, Capsule, HUMAN_CAPSULES_MAX, SCENE_OBJECTS_MAX, SceneObject};
 
-use crate::kernel::{Near, OrientedBox};
-use crate::obstacle::{CarriedBox, FAR, Obstacle, SceneFault, capsule_to_capsule};
-use crate::{ArmBody, LINK_CAPSULES_MAX, LinkCapsule};
+use crate::kernel::{Near, Wanted};
+use crate::obstacle::{CarriedPart, FAR, Obstacle, SceneFault};
+use crate::placed::{Placed, PlacedArm};
+use crate::shapes::Shapes;
+use crate::targets::{CHUNK, Targets};
+use crate::{ArmBody, BodyError, LINK_CAPSULES_MAX};
 
 /// Objects a task may allow the tool to touch.
 const TOUCH_MAX: usize = 8;
@@ -54,87 +60,51 @@ impl Separation {
     };
 }
 
-/// A capsule of the arm where the arm is.
-#[derive(Clone, Copy)]
-pub(crate) struct Placed {
-    pub(crate) ends: [Vector3<f64>; 2],
-    pub(crate) centre: Vector3<f64>,
-    /// Half extents of the segment along the base axes.
-    pub(crate) half: Vector3<f64>,
-    pub(crate) radius: f64,
-    pub(crate) link: usize,
-    tool: bool,
-}
-
-impl Placed {
-    pub(crate) const UNUSED: Self = Self {
-        ends: [Vector3::new(0.0, 0.0, 0.0); 2],
-        centre: Vector3::new(0.0, 0.0, 0.0),
-        half: Vector3::new(0.0, 0.0, 0.0),
-        radius: 0.0,
-        link: 0,
-        tool: false,
-    };
-
-    #[inline]
-    pub(crate) fn of(capsule: &LinkCapsule, poses: &LinkPoses) -> Self {
-        let pose = &poses.base_from_link[capsule.link.min(JOINTS_MAX)];
-        let ends = capsule.ends.map(|end| pose.rotation * Vector3::from(end) + pose.translation.vector);
-        Self {
-            ends,
-            centre: (ends[0] + ends[1]) * 0.5,
-            half: (ends[1] - ends[0]).abs() * 0.5,
-            radius: capsule.radius,
-            link: capsule.link,
-            tool: capsule.tool,
-        }
-    }
-}
-
-/// The arm where it is, with what it carries.
-pub(crate) struct PlacedArm {
-    capsules: [Placed; LINK_CAPSULES_MAX],
-    count: usize,
-    part: Option<OrientedBox>,
-    last_link: usize,
-}
-
 /// Distances of one arm to one scene and to people.
 ///
 /// # Realtime
-/// Every method is bounded by the array sizes; none allocates, blocks or panics.
+/// Every method but [`Monitor::with_shapes`] is bounded by the array sizes; none allocates, blocks or panics.
 #[derive(Clone, Debug)]
 pub struct Monitor {
     body: ArmBody,
-    pub(crate) obstacles: [Obstacle; SCENE_OBJECTS_MAX],
-    /// Boxes around the obstacles along the base axes: centres and half extents.
-    pub(crate) bounds: [(Vector3<f64>, Vector3<f64>); SCENE_OBJECTS_MAX],
-    pub(crate) obstacle_count: usize,
+    #[allow(clippy::disallowed_types, reason = "cloned while starting, and freed at the end")]
+    shapes: Option<Arc<Shapes>>,
+    scene: Targets<SCENE_OBJECTS_MAX>,
     scene_valid: bool,
-    human: [Capsule; HUMAN_CAPSULES_MAX],
-    human_count: usize,
-    human_valid: bool,
-    pub(crate) part: Option<CarriedBox>,
+    people: Targets<HUMAN_CAPSULES_MAX>,
+    velocities: [[f64; 3]; HUMAN_CAPSULES_MAX],
+    people_valid: bool,
+    part: Option<CarriedPart>,
     part_valid: bool,
     touch: [u32; TOUCH_MAX],
 }
 
 impl Monitor {
-    /// A monitor of an arm in an empty scene, nobody in view, nothing carried.
+    /// A monitor of an arm in an empty scene, nobody in view, nothing carried. It knows no shapes, so the
+    /// arm is its capsules.
     pub fn new(body: ArmBody) -> Self {
         Self {
             body,
-            obstacles: [Obstacle::UNUSED; SCENE_OBJECTS_MAX],
-            bounds: [(Vector3::zeros(), Vector3::zeros()); SCENE_OBJECTS_MAX],
-            obstacle_count: 0,
+            shapes: None,
+            scene: Targets::NONE,
             scene_valid: true,
-            human: [Capsule::default(); HUMAN_CAPSULES_MAX],
-            human_count: 0,
-            human_valid: true,
+            people: Targets::NONE,
+            velocities: [[0.0; 3]; HUMAN_CAPSULES_MAX],
+            people_valid: true,
             part: None,
             part_valid: true,
             touch: [0; TOUCH_MAX],
         }
+    }
+
+    /// The same with the shapes that scenes, parts and the arm's links may refer to.
+    ///
+    /// # Errors
+    /// A hull that stands for a capsule of the arm is not registered, or reaches out of that capsule.
+    #[allow(clippy::disallowed_types, reason = "made while starting")]
+    pub fn with_shapes(body: ArmBody, shapes: Arc<Shapes>) -> Result<Self, BodyError> {
+        body.check_hulls(&shapes)?;
+        Ok(Self { shapes: Some(shapes), ..Self::new(body) })
     }
 
     /// The arm.
@@ -148,7 +118,7 @@ impl Monitor {
     /// The first fault found. The scene is then invalid: clearance is −∞ until one is accepted.
     pub fn set_scene(&mut self, objects: &[SceneObject]) -> Result<(), SceneFault> {
         self.scene_valid = false;
-        self.obstacle_count = 0;
+        self.scene.clear();
         if objects.len() > SCENE_OBJECTS_MAX {
             return Err(SceneFault::TooMany { count: objects.len() });
         }
@@ -156,11 +126,8 @@ impl Monitor {
             if objects[..index].iter().any(|other| other.id == object.id) {
                 return Err(SceneFault::Identity { index, id: object.id });
             }
-            let obstacle = Obstacle::of(index, object)?;
-            self.obstacles[index] = obstacle;
-            self.bounds[index] = obstacle.bounds();
+            self.scene.push(Obstacle::of(index, object, self.shapes.as_deref())?);
         }
-        self.obstacle_count = objects.len();
         self.scene_valid = true;
         Ok(())
     }
@@ -173,11 +140,13 @@ impl Monitor {
                 && capsule.radius > 0.0
                 && capsule.radius <= FAR
         };
-        self.human_valid = capsules.len() <= HUMAN_CAPSULES_MAX && capsules.iter().all(fits);
-        self.human_count = 0;
-        if self.human_valid {
-            self.human_count = capsules.len();
-            self.human[..capsules.len()].copy_from_slice(capsules);
+        self.people_valid = capsules.len() <= HUMAN_CAPSULES_MAX && capsules.iter().all(fits);
+        self.people.clear();
+        if self.people_valid {
+            for (index, (capsule, velocity)) in capsules.iter().zip(&mut self.velocities).enumerate() {
+                self.people.push(Obstacle::of_person(index as u32, capsule));
+                *velocity = capsule.velocity;
+            }
         }
     }
 
@@ -185,7 +154,7 @@ impl Monitor {
     /// cannot be makes every distance −∞ until a good one is given.
     pub fn set_attached(&mut self, part: Option<&AttachedPart>) {
         let part = part.filter(|part| part.present != 0);
-        self.part = part.and_then(CarriedBox::of);
+        self.part = part.and_then(|part| CarriedPart::of(part, self.shapes.as_deref()));
         self.part_valid = part.is_none() || self.part.is_some();
     }
 
@@ -200,12 +169,19 @@ impl Monitor {
     }
 
     /// The smallest distance to the scene and to the arm itself. The base (link 0) is checked against
-    /// the other links only.
+    /// the other links only. Of pairs equally near that of the lowest link and object is named.
     pub fn clearance(&self, poses: &LinkPoses) -> Clearance {
         match self.place(poses) {
             Some(arm) if self.scene_valid => self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY),
             _ => contact(),
         }
+    }
+
+    /// [`Monitor::clearance`] and [`Monitor::separation`] at once, which is quicker than one after the other.
+    pub fn measure(&self, poses: &LinkPoses) -> (Clearance, Separation) {
+        let Some(arm) = self.place(poses) else { return (contact(), lost()) };
+        let clearance = if self.scene_valid { self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY) } else { contact() };
+        (clearance, if self.people_valid { self.nearest_person(&arm) } else { lost() })
     }
 
     /// Whether scene and arm itself are more than `margin` metres away. People are not looked at.
@@ -221,15 +197,7 @@ impl Monitor {
 
     /// The smallest distance to a person.
     pub fn separation(&self, poses: &LinkPoses) -> Separation {
-        let Some(arm) = self.place_for_people(poses) else { return lost() };
-        let mut best = Separation::NOBODY;
-        for capsule in 0..self.human_count {
-            let near = self.near_person(&arm, capsule, best.distance);
-            if near.distance < best.distance {
-                best = near;
-            }
-        }
-        best
+        self.place_for_people(poses).map_or_else(lost, |arm| self.nearest_person(&arm))
     }
 
     /// The smallest distance to each capsule of the person, in their order, for a separation by body
@@ -237,15 +205,22 @@ impl Monitor {
     pub fn separations(&self, poses: &LinkPoses) -> [Separation; HUMAN_CAPSULES_MAX] {
         let Some(arm) = self.place_for_people(poses) else { return [lost(); HUMAN_CAPSULES_MAX] };
         let mut all = [Separation::NOBODY; HUMAN_CAPSULES_MAX];
-        for (capsule, slot) in all.iter_mut().enumerate().take(self.human_count) {
-            *slot = self.near_person(&arm, capsule, f64::INFINITY);
+        for (index, (person, slot)) in self.people.all().iter().zip(&mut all).enumerate() {
+            let mut best = nothing();
+            for body in arm.bodies().iter().rev().filter(|body| body.link != 0) {
+                let gap = self.people.squared_gap(index, &body.centre, &body.half);
+                if may_be_nearer(gap, best.distance + body.radius + self.people.around(index)) {
+                    check(&arm, body, person, f64::NEG_INFINITY, &mut best);
+                }
+            }
+            *slot = self.separation_of(&best);
         }
         all
     }
 
     /// Capsules of the people in view.
     pub fn human_count(&self) -> usize {
-        self.human_count
+        self.people.all().len()
     }
 
     /// Whether scene and part are such that anything can be said at all.
@@ -253,182 +228,179 @@ impl Monitor {
         self.scene_valid && self.part_valid
     }
 
-    /// The arm at these poses, or `None` when a number is not finite or absurd.
-    fn place(&self, poses: &LinkPoses) -> Option<PlacedArm> {
-        let last_link = poses.count.min(JOINTS_MAX);
-        let mut arm = PlacedArm { capsules: [Placed::UNUSED; LINK_CAPSULES_MAX], count: 0, part: None, last_link };
-        if !self.part_valid {
-            return None;
-        }
-        let mut sound = true;
-        for (slot, capsule) in arm.capsules.iter_mut().zip(self.body.capsules()) {
-            *slot = Placed::of(capsule, poses);
-            sound &= slot.ends.iter().all(|end| end.iter().all(|x| x.abs() <= FAR));
-            arm.count += 1;
-        }
-        let tcp = &poses.base_from_tcp;
-        sound &= tcp.translation.vector.iter().all(|x| x.abs() <= FAR);
-        sound &= tcp.rotation.coords.iter().all(|x| x.is_finite());
-        arm.part = self.part.map(|part| part.at(tcp));
-        sound.then_some(arm)
+    /// The scene.
+    pub(crate) fn scene(&self) -> &Targets<SCENE_OBJECTS_MAX> {
+        &self.scene
     }
 
-    fn place_for_people(&self, poses: &LinkPoses) -> Option<PlacedArm> {
-        if self.human_valid { self.place(poses) } else { None }
+    pub(crate) fn has_part(&self) -> bool {
+        self.part.is_some()
+    }
+
+    /// The arm at these poses, its capsules not placed yet.
+    pub(crate) fn unplaced<'a>(&'a self, poses: &'a LinkPoses) -> PlacedArm<'a> {
+        PlacedArm::new(&self.body, self.part.as_ref(), poses, self.shapes.as_deref())
     }
 
     pub(crate) fn may_touch(&self, id: u32) -> bool {
         self.touch.contains(&id)
     }
 
+    /// The arm at these poses, or `None` when a number is not finite or absurd.
+    fn place<'a>(&'a self, poses: &'a LinkPoses) -> Option<PlacedArm<'a>> {
+        if !self.part_valid {
+            return None;
+        }
+        let mut arm = self.unplaced(poses);
+        arm.place().then_some(arm)
+    }
+
+    fn place_for_people<'a>(&'a self, poses: &'a LinkPoses) -> Option<PlacedArm<'a>> {
+        if self.people_valid { self.place(poses) } else { None }
+    }
+
     /// The nearest of all pairs that are nearer than `limit`; stops early once below `enough`.
     fn nearest(&self, arm: &PlacedArm, limit: f64, enough: f64) -> Clearance {
         let mut best = Clearance { distance: limit, ..nothing() };
-        // From the tool inwards: what is nearest is mostly out there, and finding it first spares the rest.
-        for capsule in arm.capsules[..arm.count].iter().rev() {
-            if capsule.link == 0 {
-                continue;
-            }
-            self.capsule_to_scene(capsule, &mut best);
-            if best.distance <= enough {
-                return best;
-            }
-        }
-        if let Some(part) = &arm.part {
-            self.part_to_scene(part, arm, &mut best);
-            part_to_arm(part, arm, &mut best);
-        }
+        against(arm, &self.scene, &self.touch, enough, &mut best);
         if best.distance > enough {
-            self.arm_to_itself(arm, &mut best);
+            self.arm_to_itself(arm, enough, &mut best);
         }
         best
     }
 
-    fn capsule_to_scene(&self, capsule: &Placed, best: &mut Clearance) {
-        let count = self.obstacle_count.min(SCENE_OBJECTS_MAX);
-        let mut gaps = [0.0; SCENE_OBJECTS_MAX];
-        let mut first = (f64::INFINITY, 0);
-        for (index, (gap, (centre, half))) in gaps.iter_mut().zip(&self.bounds[..count]).enumerate() {
-            *gap = squared_gap(&capsule.centre, &capsule.half, centre, half);
-            if *gap < first.0 {
-                first = (*gap, index);
-            }
-        }
-        let check = |index: usize, best: &mut Clearance| {
-            let obstacle = &self.obstacles[index];
-            if capsule.tool && self.may_touch(obstacle.id) {
-                return;
-            }
-            let near = obstacle.near_capsule(&capsule.ends, capsule.radius);
-            keep(best, &near, capsule.link, obstacle.id);
-        };
-        if count > 0 {
-            check(first.1, best);
-        }
-        for (index, gap) in gaps[..count].iter().enumerate() {
-            let reach = best.distance + capsule.radius;
-            if index != first.1 && reach > 0.0 && *gap < reach * reach {
-                check(index, best);
-            }
-        }
-    }
-
-    fn part_to_scene(&self, part: &OrientedBox, arm: &PlacedArm, best: &mut Clearance) {
-        let half = part.half_in_base();
-        for (obstacle, (centre, bounds)) in self.obstacles.iter().zip(&self.bounds).take(self.obstacle_count) {
-            let near_enough = {
-                let gap = squared_gap(&part.centre, &half, centre, bounds);
-                // Once something overlaps, deeper overlaps still count.
-                best.distance > 0.0 && gap < best.distance * best.distance || gap == 0.0
-            };
-            if !near_enough || self.may_touch(obstacle.id) {
-                continue;
-            }
-            if let Some(near) = obstacle.near_box(part, best.distance) {
-                keep(best, &near, arm.last_link, obstacle.id);
-            }
-        }
-    }
-
-    fn arm_to_itself(&self, arm: &PlacedArm, best: &mut Clearance) {
+    fn arm_to_itself(&self, arm: &PlacedArm, enough: f64, best: &mut Clearance) {
+        let bodies = arm.bodies();
         for [a, b] in self.body.self_pairs() {
-            let (first, second) = (&arm.capsules[a], &arm.capsules[b]);
-            let reach = best.distance + first.radius + second.radius;
-            let gap = squared_gap(&first.centre, &first.half, &second.centre, &second.half);
-            if reach > 0.0 && gap < reach * reach {
-                let near = capsule_to_capsule(&first.ends, first.radius, &second.ends, second.radius);
-                if second.link >= first.link {
-                    keep(best, &near.swapped(), second.link, 0);
-                } else {
-                    keep(best, &near, first.link, 0);
-                }
+            check_own(arm, &bodies[a], &bodies[b], enough, best);
+        }
+        // The part against the links it does not hang on.
+        if let Some(part) = arm.part() {
+            for body in bodies.iter().filter(|body| body.link < part.link) {
+                check_own(arm, part, body, enough, best);
             }
         }
     }
 
-    /// The arm's nearest to one capsule of the person, as far as it is nearer than `limit`.
-    fn near_person(&self, arm: &PlacedArm, capsule: usize, limit: f64) -> Separation {
-        let person = &self.human[capsule.min(HUMAN_CAPSULES_MAX - 1)];
-        let ends = person.ends.map(Vector3::from);
-        let centre = (ends[0] + ends[1]) * 0.5;
-        let half = (ends[1] - ends[0]).abs() * 0.5;
-        let mut best = Clearance { distance: limit, ..nothing() };
-        for own in arm.capsules[..arm.count].iter().rev().filter(|own| own.link != 0) {
-            let reach = best.distance + own.radius + person.radius;
-            let gap = squared_gap(&own.centre, &own.half, &centre, &half);
-            if reach > 0.0 && gap < reach * reach {
-                let near = capsule_to_capsule(&own.ends, own.radius, &ends, person.radius);
-                keep(&mut best, &near, own.link, 0);
-            }
+    fn nearest_person(&self, arm: &PlacedArm) -> Separation {
+        let mut best = nothing();
+        against(arm, &self.people, &[], f64::NEG_INFINITY, &mut best);
+        self.separation_of(&best)
+    }
+
+    fn separation_of(&self, best: &Clearance) -> Separation {
+        if best.distance == f64::INFINITY {
+            return Separation::NOBODY;
         }
-        if let Some(part) = &arm.part {
-            let near = part.near_segment(&ends).padded(person.radius, 0.0).swapped();
-            keep(&mut best, &near, arm.last_link, 0);
-        }
+        let capsule = (best.object as usize).min(HUMAN_CAPSULES_MAX - 1);
         let from = Vector3::from(best.point_on_arm);
         let apart = Vector3::from(best.point_on_other) - from;
         // Overlapping, the points have changed sides.
         let apart = if best.distance < 0.0 { -apart } else { apart };
+        let centre = self.people.all().get(capsule).map_or(from, Obstacle::centre);
         let direction = apart.try_normalize(1e-9).or_else(|| (centre - from).try_normalize(1e-9));
         Separation {
             distance: best.distance,
             link: best.link,
             capsule,
             direction: direction.unwrap_or_else(Vector3::zeros).into(),
-            human_velocity: person.velocity,
+            human_velocity: self.velocities[capsule],
             point_on_arm: best.point_on_arm,
         }
     }
 }
 
-/// The part against the links it does not hang on.
-fn part_to_arm(part: &OrientedBox, arm: &PlacedArm, best: &mut Clearance) {
-    let half = part.half_in_base();
-    for capsule in arm.capsules[..arm.count].iter().filter(|capsule| capsule.link < arm.last_link) {
-        let reach = best.distance + capsule.radius;
-        let gap = squared_gap(&part.centre, &half, &capsule.centre, &capsule.half);
-        if reach > 0.0 && gap < reach * reach {
-            let near = part.near_segment(&capsule.ends).padded(capsule.radius, 0.0).swapped();
-            keep(best, &near, arm.last_link, 0);
+/// The arm against all targets. Tool and part may touch those that `touch` names.
+#[inline]
+fn against<const N: usize>(arm: &PlacedArm, targets: &Targets<N>, touch: &[u32], enough: f64, best: &mut Clearance) {
+    let may_touch = |body: &Placed, obstacle: &Obstacle| body.tool && touch.contains(&obstacle.id);
+    let bodies = arm.bodies();
+    if targets.all().is_empty() {
+        return;
+    }
+    // Boxes tell which pair is likely to be the nearest; once it is known, they spare nearly all others.
+    let mut least = [0.0; LINK_CAPSULES_MAX + 1];
+    if enough == f64::NEG_INFINITY {
+        let mut first = (f64::INFINITY, 0);
+        for (index, body) in bodies.iter().enumerate().filter(|(_, body)| body.link != 0) {
+            least[index] = targets.squared_gap_min(&body.centre, &body.half);
+            if least[index] < first.0 {
+                first = (least[index], index);
+            }
+        }
+        let body = &bodies[first.1];
+        let gaps = targets.squared_gaps(&body.centre, &body.half);
+        let nearest = gaps.iter().zip(targets.all()).find(|(gap, _)| **gap == first.0);
+        if let Some((_, obstacle)) = nearest.filter(|(_, obstacle)| !may_touch(body, obstacle)) {
+            check(arm, body, obstacle, enough, best);
+        }
+    }
+    // From the tool inwards: what is nearest is mostly out there.
+    for (body, least) in bodies.iter().zip(least).rev().filter(|(body, _)| body.link != 0) {
+        if !may_be_nearer(least, best.distance + body.radius + targets.around_max()) {
+            continue;
+        }
+        let gaps = targets.squared_gaps(&body.centre, &body.half);
+        for (chunk, gaps) in gaps.chunks(CHUNK).enumerate() {
+            let reach = best.distance + body.radius + targets.around_max();
+            let squared = reach.max(0.0).powi(2);
+            if !gaps.iter().fold(false, |any, gap| any | (*gap <= squared)) {
+                continue;
+            }
+            for (lane, gap) in gaps.iter().enumerate() {
+                let index = chunk * CHUNK + lane;
+                let Some(obstacle) = targets.all().get(index) else { break };
+                let reach = best.distance + body.radius + targets.around(index);
+                if may_be_nearer(*gap, reach) && !may_touch(body, obstacle) {
+                    check(arm, body, obstacle, enough, best);
+                    if best.distance <= enough {
+                        return;
+                    }
+                }
+            }
         }
     }
 }
 
-/// Squared distance of two boxes along the base axes, given by centre and half extents.
+/// Whether what lies in two boxes with this squared gap may be within `reach`. Where the boxes overlap
+/// there is no telling how deep.
 #[inline]
-pub(crate) fn squared_gap(a: &Vector3<f64>, a_half: &Vector3<f64>, b: &Vector3<f64>, b_half: &Vector3<f64>) -> f64 {
-    let mut sum = 0.0;
-    for axis in 0..3 {
-        let gap = ((a[axis] - b[axis]).abs() - a_half[axis] - b_half[axis]).max(0.0);
-        sum += gap * gap;
+fn may_be_nearer(squared_gap: f64, reach: f64) -> bool {
+    let reach = reach.max(0.0);
+    squared_gap <= reach * reach
+}
+
+#[inline]
+fn check(arm: &PlacedArm, body: &Placed, obstacle: &Obstacle, enough: f64, best: &mut Clearance) {
+    let wanted = Wanted { limit: best.distance, enough };
+    if let Some(near) = arm.near(body, obstacle, wanted) {
+        keep(best, &near, body.link, obstacle.id);
     }
-    sum
+}
+
+/// Two bodies of the arm; the one farther out is the first of the answer.
+#[inline]
+fn check_own(arm: &PlacedArm, first: &Placed, second: &Placed, enough: f64, best: &mut Clearance) {
+    if !may_be_nearer(first.squared_gap(second), best.distance + first.radius + second.radius) {
+        return;
+    }
+    let wanted = Wanted { limit: best.distance, enough };
+    if let Some(near) = arm.near_each_other(first, second, wanted) {
+        if second.link >= first.link {
+            keep(best, &near.swapped(), second.link, 0);
+        } else {
+            keep(best, &near, first.link, 0);
+        }
+    }
 }
 
 #[inline]
 fn keep(best: &mut Clearance, near: &Near, link: usize, object: u32) {
+    // Whatever the order they are looked at in, of pairs equally near the same is named.
+    let nearer =
+        near.distance < best.distance || near.distance == best.distance && (link, object) < (best.link, best.object);
     // A kernel that came to no number counts as a contact.
-    if near.distance < best.distance || near.distance.is_nan() {
+    if nearer || near.distance.is_nan() {
         *best = Clearance {
             distance: if near.distance.is_nan() { f64::NEG_INFINITY } else { near.distance },
             link,

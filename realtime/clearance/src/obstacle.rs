@@ -2,10 +2,12 @@
 
 use core::fmt;
 
-use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
-use tandem_msg::{AttachedPart, Pose, SCENE_OBJECTS_MAX, SceneObject, ShapeKind};
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use tandem_msg::{AttachedPart, Capsule, Pose, SCENE_OBJECTS_MAX, SceneObject, ShapeKind};
 
-use crate::kernel::{Near, OrientedBox, box_to_box, point_to_segment, segment_to_cylinder, segment_to_segment};
+use crate::kernel::{Core, Near, OrientedBox, Wanted, core_to_core};
+use crate::mesh::Mesh;
+use crate::shapes::{Hull, Shapes};
 
 /// Numbers past this, in metres, are taken for garbage.
 pub(crate) const FAR: f64 = 1e4;
@@ -37,6 +39,11 @@ pub enum SceneFault {
         /// The object.
         id: u32,
     },
+    /// The number it gives is of no registered hull or mesh.
+    Unregistered {
+        /// The object.
+        id: u32,
+    },
     /// The pose is not finite, or its quaternion not of unit length.
     Pose {
         /// The object.
@@ -53,6 +60,7 @@ impl fmt::Display for SceneFault {
             }
             Self::Shape { id, code } => write!(f, "object {id} has shape = {code}, which no shape has"),
             Self::Size { id } => write!(f, "object {id} has a size that is not finite and above 0 m"),
+            Self::Unregistered { id } => write!(f, "object {id} names a shape that was not registered at start"),
             Self::Pose { id } => write!(f, "object {id} has a pose that is not finite or not of unit rotation"),
         }
     }
@@ -62,7 +70,7 @@ impl core::error::Error for SceneFault {}
 
 /// A shape in the frame of its box.
 #[derive(Clone, Copy, Debug)]
-enum Solid {
+enum Form {
     Box,
     /// Along z, with flat caps.
     Cylinder {
@@ -74,21 +82,24 @@ enum Solid {
         ends: [Vector3<f64>; 2],
         radius: f64,
     },
+    /// Number among the registered shapes.
+    Hull(u32),
+    Mesh(u32),
 }
 
-/// One object of the scene.
+/// One object of the scene, or one capsule of a person.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Obstacle {
     pub(crate) id: u32,
-    solid: Solid,
+    form: Form,
     /// The box that holds it; the object itself when it is a box.
-    hull: OrientedBox,
+    frame: OrientedBox,
 }
 
 impl Obstacle {
-    pub(crate) const UNUSED: Self = Self { id: 0, solid: Solid::Box, hull: OrientedBox::UNUSED };
+    pub(crate) const UNUSED: Self = Self { id: 0, form: Form::Box, frame: OrientedBox::UNUSED };
 
-    pub(crate) fn of(index: usize, object: &SceneObject) -> Result<Self, SceneFault> {
+    pub(crate) fn of(index: usize, object: &SceneObject, shapes: Option<&Shapes>) -> Result<Self, SceneFault> {
         let id = object.id;
         if id == 0 {
             return Err(SceneFault::Identity { index, id });
@@ -98,6 +109,9 @@ impl Obstacle {
         };
         let pose = isometry(&object.base_from_object).ok_or(SceneFault::Pose { id })?;
         let [a, b, c] = object.size;
+        if shape == ShapeKind::Registered {
+            return registered(id, a, &pose, shapes);
+        }
         let axes = pose.rotation.to_rotation_matrix().into_inner();
         let centre = pose.translation.vector;
         let counted: &[f64] = match shape {
@@ -106,119 +120,126 @@ impl Obstacle {
             ShapeKind::Sphere => &[a],
             // A capsule of no length is a sphere.
             ShapeKind::Capsule if b == 0.0 => &[a],
-            ShapeKind::Capsule => &[a, b],
+            ShapeKind::Capsule | ShapeKind::Registered => &[a, b],
         };
         if !counted.iter().all(|size| *size > 0.0 && *size <= FAR) {
             return Err(SceneFault::Size { id });
         }
-        let (solid, half) = match shape {
-            ShapeKind::Box => (Solid::Box, Vector3::new(a, b, c)),
-            ShapeKind::Cylinder => (Solid::Cylinder { radius: a, half_length: b }, Vector3::new(a, a, b)),
+        let (form, half) = match shape {
+            ShapeKind::Cylinder => (Form::Cylinder { radius: a, half_length: b }, Vector3::new(a, a, b)),
             ShapeKind::Capsule => {
                 let ends = [centre - axes.column(2) * b, centre + axes.column(2) * b];
-                (Solid::Capsule { ends, radius: a }, Vector3::new(a, a, a + b))
+                (Form::Capsule { ends, radius: a }, Vector3::new(a, a, a + b))
             }
-            ShapeKind::Sphere => (Solid::Capsule { ends: [centre; 2], radius: a }, Vector3::new(a, a, a)),
+            ShapeKind::Sphere => (Form::Capsule { ends: [centre; 2], radius: a }, Vector3::new(a, a, a)),
+            ShapeKind::Box | ShapeKind::Registered => (Form::Box, Vector3::new(a, b, c)),
         };
-        Ok(Self { id, solid, hull: OrientedBox { centre, axes, half } })
+        Ok(Self { id, form, frame: OrientedBox { centre, axes, half } })
     }
 
-    /// Centre and half extents of a box along the base axes that holds the object.
-    pub(crate) fn bounds(&self) -> (Vector3<f64>, Vector3<f64>) {
-        let half = match self.solid {
-            Solid::Capsule { ends, radius } => (ends[1] - ends[0]).abs() * 0.5 + Vector3::repeat(radius),
-            Solid::Box | Solid::Cylinder { .. } => self.hull.half_in_base(),
-        };
-        (self.hull.centre, half)
+    /// A capsule of a person.
+    pub(crate) fn of_person(id: u32, capsule: &Capsule) -> Self {
+        let ends = capsule.ends.map(Vector3::from);
+        let centre = (ends[0] + ends[1]) * 0.5;
+        let frame = OrientedBox { centre, ..OrientedBox::UNUSED };
+        Self { id, form: Form::Capsule { ends, radius: capsule.radius }, frame }
     }
 
-    /// Nearest points of a capsule (first) and this object (second), base coordinates.
+    /// Centre and half extents of a box along the base axes that holds the object's core, and the
+    /// radius around that core.
+    pub(crate) fn bounds(&self) -> (Vector3<f64>, Vector3<f64>, f64) {
+        match self.form {
+            Form::Capsule { ends, radius } => (self.frame.centre, (ends[1] - ends[0]).abs() * 0.5, radius),
+            Form::Box | Form::Cylinder { .. } | Form::Hull(_) | Form::Mesh(_) => {
+                (self.frame.centre, self.frame.half_in_base(), 0.0)
+            }
+        }
+    }
+
+    /// Whether a capsule's distance to it has a closed form.
+    pub(crate) fn is_quick(&self) -> bool {
+        !matches!(self.form, Form::Hull(_) | Form::Mesh(_))
+    }
+
+    pub(crate) fn centre(&self) -> Vector3<f64> {
+        self.frame.centre
+    }
+
+    /// Nearest points of a body (first), given by its core and the radius around it, and this object
+    /// (second), base coordinates; `None` when they are farther apart than wanted.
     #[inline]
-    pub(crate) fn near_capsule(&self, ends: &[Vector3<f64>; 2], radius: f64) -> Near {
-        match &self.solid {
-            Solid::Box => self.hull.near_segment(ends).padded(radius, 0.0),
-            Solid::Cylinder { radius: own, half_length } => {
-                let local = [self.hull.inwards(&ends[0]), self.hull.inwards(&ends[1])];
-                segment_to_cylinder(&local, *own, *half_length)
-                    .mapped(|point| self.hull.outwards(point))
-                    .padded(radius, 0.0)
+    pub(crate) fn near(
+        &self,
+        core: &Core,
+        radius: f64,
+        towards: Option<Vector3<f64>>,
+        wanted: Wanted,
+        shapes: Option<&Shapes>,
+    ) -> Option<Near> {
+        let (own, around) = match self.form {
+            Form::Box => (Core::Box(self.frame), 0.0),
+            Form::Cylinder { radius, half_length } => (Core::Cylinder { frame: self.frame, radius, half_length }, 0.0),
+            Form::Capsule { ends, radius } => (Core::Segment(ends), radius),
+            Form::Hull(number) => {
+                let Some(hull) = shapes.and_then(|shapes| shapes.hull(number)) else { return Some(Near::LOST) };
+                (Core::Hull { frame: self.frame, hull }, 0.0)
             }
-            Solid::Capsule { ends: own, radius: around } => capsule_to_capsule(ends, radius, own, *around),
-        }
-    }
-
-    /// Nearest points of a box (first) and this object (second), or `None` when farther than `enough`.
-    pub(crate) fn near_box(&self, part: &OrientedBox, enough: f64) -> Option<Near> {
-        match &self.solid {
-            Solid::Box => box_to_box(part, &self.hull, enough),
-            Solid::Capsule { ends, radius } => Some(part.near_segment(ends).padded(*radius, 0.0).swapped()),
-            Solid::Cylinder { radius, half_length } => self.cylinder_to_box(part, *radius, *half_length, enough),
-        }
-    }
-
-    /// The cylinder lies in each of the boxes around it, so the largest of their distances is not too
-    /// large: one box that faces the part, one that stands at 45° to it.
-    fn cylinder_to_box(&self, part: &OrientedBox, radius: f64, half_length: f64, enough: f64) -> Option<Near> {
-        let towards = self.hull.inwards(&part.centre);
-        let across = towards.x.hypot(towards.y);
-        let (cos, sin) = if across > 1e-9 { (towards.x / across, towards.y / across) } else { (1.0, 0.0) };
-        let diagonal = core::f64::consts::FRAC_1_SQRT_2;
-        let mut farthest: Option<Near> = None;
-        for (cos, sin) in [(cos, sin), ((cos - sin) * diagonal, (cos + sin) * diagonal)] {
-            let turn = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
-            let around = OrientedBox {
-                centre: self.hull.centre,
-                axes: self.hull.axes * turn,
-                half: Vector3::new(radius, radius, half_length),
-            };
-            let near = box_to_box(part, &around, enough)?;
-            if farthest.is_none_or(|other| near.distance > other.distance) {
-                farthest = Some(near);
+            Form::Mesh(number) => {
+                let Some(mesh) = shapes.and_then(|shapes| shapes.mesh(number)) else { return Some(Near::LOST) };
+                let near = mesh.near(&core.seen_from(&self.frame), wanted.of_cores(radius))?;
+                return Some(near.mapped(|point| self.frame.outwards(point)).padded(radius, 0.0));
             }
-        }
-        farthest
+        };
+        Some(core_to_core(core, &own, towards, wanted.of_cores(radius + around))?.padded(radius, around))
     }
 }
 
-/// Nearest points of two capsules.
-#[inline]
-pub(crate) fn capsule_to_capsule(
-    first: &[Vector3<f64>; 2],
-    first_radius: f64,
-    second: &[Vector3<f64>; 2],
-    second_radius: f64,
-) -> Near {
-    let near = if second[0] == second[1] {
-        point_to_segment(&second[0], first).swapped()
-    } else {
-        segment_to_segment(first, second)
-    };
-    near.padded(first_radius, second_radius)
+/// An object that is a registered shape.
+fn registered(id: u32, number: f64, pose: &Isometry3<f64>, shapes: Option<&Shapes>) -> Result<Obstacle, SceneFault> {
+    // What is no whole number turns into one that differs from it.
+    let whole = number as u32;
+    let found = shapes.filter(|_| f64::from(whole) == number).and_then(|shapes| {
+        let hull = |hull: &Hull| (Form::Hull(whole), box_at(pose, hull.centre, hull.half));
+        let mesh = |mesh: &Mesh| (Form::Mesh(whole), box_at(pose, mesh.centre, mesh.half));
+        shapes.hull(whole).map(hull).or_else(|| shapes.mesh(whole).map(mesh))
+    });
+    let (form, frame) = found.ok_or(SceneFault::Unregistered { id })?;
+    Ok(Obstacle { id, form, frame })
 }
 
-/// The carried part: the box's pose on the TCP and its half extents.
+/// A box given by its middle and half extents in a frame.
+pub(crate) fn box_at(pose: &Isometry3<f64>, centre: Vector3<f64>, half: Vector3<f64>) -> OrientedBox {
+    let axes = pose.rotation.to_rotation_matrix().into_inner();
+    OrientedBox { centre: axes * centre + pose.translation.vector, axes, half }
+}
+
+/// The carried part: the pose on the TCP of the box around it, and the hull in it when it is no box.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct CarriedBox {
-    pub(crate) tcp_from_part: Isometry3<f64>,
-    pub(crate) half: Vector3<f64>,
+pub(crate) struct CarriedPart {
+    tcp_from_part: Isometry3<f64>,
+    centre: Vector3<f64>,
+    half: Vector3<f64>,
+    /// Number among the registered shapes; 0 is the box itself.
+    pub(crate) hull: u32,
 }
 
-impl CarriedBox {
+impl CarriedPart {
     /// The part, or `None` when a number of it cannot be.
-    pub(crate) fn of(part: &AttachedPart) -> Option<Self> {
-        let fits = part.half_extents.iter().all(|half| *half > 0.0 && *half <= FAR);
+    pub(crate) fn of(part: &AttachedPart, shapes: Option<&Shapes>) -> Option<Self> {
         let tcp_from_part = isometry(&part.tcp_from_part)?;
-        fits.then(|| Self { tcp_from_part, half: Vector3::from(part.half_extents) })
+        let (centre, half) = if part.shape == 0 {
+            let fits = part.half_extents.iter().all(|half| *half > 0.0 && *half <= FAR);
+            fits.then(|| (Vector3::zeros(), Vector3::from(part.half_extents)))?
+        } else {
+            let hull = shapes?.hull(part.shape)?;
+            (hull.centre, hull.half)
+        };
+        Some(Self { tcp_from_part, centre, half, hull: part.shape })
     }
 
-    /// The box where the TCP is.
+    /// The box around the part where the TCP is.
     pub(crate) fn at(&self, base_from_tcp: &Isometry3<f64>) -> OrientedBox {
-        let pose = base_from_tcp * self.tcp_from_part;
-        OrientedBox {
-            centre: pose.translation.vector,
-            axes: pose.rotation.to_rotation_matrix().into_inner(),
-            half: self.half,
-        }
+        box_at(&(base_from_tcp * self.tcp_from_part), self.centre, self.half)
     }
 }
 

@@ -13,9 +13,8 @@ use nalgebra::Vector3;
 use tandem_kinematics::{Chain, JOINTS_MAX, JointKind, LinkPoses};
 use tandem_msg::SCENE_OBJECTS_MAX;
 
-use crate::kernel::OrientedBox;
-use crate::monitor::{Placed, squared_gap};
-use crate::obstacle::capsule_to_capsule;
+use crate::kernel::Wanted;
+use crate::placed::PlacedArm;
 use crate::{LINK_CAPSULES_MAX, Monitor, SELF_PAIRS_MAX};
 
 /// Looks along one motion; a motion that needs more is called not clear.
@@ -163,9 +162,9 @@ impl Default for MotionSweep {
 impl Pairs {
     /// All that the arm and its part must not touch.
     fn of(monitor: &Monitor) -> Self {
-        let count = monitor.obstacle_count.min(SCENE_OBJECTS_MAX);
-        let all = if count == 0 { 0 } else { u64::MAX >> (64 - count) };
-        let touchable = monitor.obstacles[..count]
+        let objects = monitor.scene().all();
+        let all = if objects.is_empty() { 0 } else { u64::MAX >> (64 - objects.len()) };
+        let touchable = objects
             .iter()
             .enumerate()
             .filter(|(_, obstacle)| monitor.may_touch(obstacle.id))
@@ -181,7 +180,7 @@ impl Pairs {
         for (index, _) in monitor.body().self_pairs().enumerate() {
             pairs.own[index / 64] |= 1 << (index % 64);
         }
-        if monitor.part.is_some() {
+        if monitor.has_part() {
             pairs.part_objects = all & !touchable;
             pairs.part_capsules = (1 << monitor.body().capsules().len()) - 1;
         }
@@ -254,16 +253,16 @@ impl Look<'_> {
                 used |= 1 << a | 1 << b;
             }
         }
-        let mut placed = [Placed::UNUSED; LINK_CAPSULES_MAX];
+        let mut placed = monitor.unplaced(self.poses);
         let mut travels = [0.0; LINK_CAPSULES_MAX];
         // From the tool inwards: what moves farthest meets something first.
         for (index, capsule) in arm.iter().enumerate().rev() {
             if pairs.objects[index] == 0 && used >> index & 1 == 0 {
                 continue;
             }
-            placed[index] = Placed::of(capsule, self.poses);
-            travels[index] = self.wander.of(&placed[index].ends, 0.0, 0, capsule.link);
-            if !self.sift_objects(&placed[index], travels[index], &mut pairs.objects[index]) {
+            let (points, around) = placed.place_capsule(index).extent();
+            travels[index] = self.wander.of(&points, around, 0, capsule.link);
+            if !self.sift_objects(&placed, index, travels[index], &mut pairs.objects[index]) {
                 return false;
             }
         }
@@ -272,40 +271,66 @@ impl Look<'_> {
             if pairs.own[index / 64] & bit == 0 {
                 continue;
             }
-            let (a, b) = if placed[a].link < placed[b].link { (a, b) } else { (b, a) };
-            let (near, far) = (&placed[a], &placed[b]);
-            // Joints that move both do not move them against each other.
-            let reach = self.margin + near.radius + far.radius + travels[b];
-            let gap = squared_gap(&near.centre, &near.half, &far.centre, &far.half);
-            let mut keep = false;
-            if gap < reach * reach {
-                let travel = self.wander.of(&far.ends, 0.0, near.link, far.link);
-                let distance = capsule_to_capsule(&near.ends, near.radius, &far.ends, far.radius).distance;
-                match self.weigh(distance, travel) {
-                    Some(kept) => keep = kept,
+            let (near, far) = if arm[a].link < arm[b].link { (a, b) } else { (b, a) };
+            match self.sift_own(&placed, near, far, travels[far]) {
+                Some(true) => {}
+                Some(false) => pairs.own[index / 64] &= !bit,
+                None => return false,
+            }
+        }
+        let part_index = arm.len();
+        let Some(part) = placed.part() else { return true };
+        let (points, around) = part.extent();
+        let travel = self.wander.of(&points, around, 0, part.link);
+        if !self.sift_objects(&placed, part_index, travel, &mut pairs.part_objects) {
+            return false;
+        }
+        let mut left = pairs.part_capsules;
+        while left != 0 {
+            let index = left.trailing_zeros() as usize;
+            left &= left - 1;
+            // The part hangs on its own link.
+            if arm[index].link < part.link {
+                match self.sift_own(&placed, index, part_index, travel) {
+                    Some(true) => continue,
+                    Some(false) => {}
                     None => return false,
                 }
             }
-            if !keep {
-                pairs.own[index / 64] &= !bit;
-            }
+            pairs.part_capsules &= !(1 << index);
         }
-        match &monitor.part {
-            Some(part) => self.sift_part(&part.at(&self.poses.base_from_tcp), &placed, pairs),
-            None => true,
+        true
+    }
+
+    /// Two bodies of the arm, the first nearer to its base: whether they may still meet, `None` when they
+    /// are too near. `travel` is how far the second gets.
+    fn sift_own(&mut self, arm: &PlacedArm, near: usize, far: usize, travel: f64) -> Option<bool> {
+        let (near, far) = (&arm.bodies()[near], &arm.bodies()[far]);
+        let reach = self.margin + near.radius + far.radius + travel;
+        if !(near.squared_gap(far) < reach * reach) {
+            return Some(false);
+        }
+        // Joints that move both do not move them against each other.
+        let (points, around) = far.extent();
+        let travel = self.wander.of(&points, around, near.link, far.link);
+        match arm.near_each_other(near, far, self.wanted(travel)) {
+            Some(found) => self.weigh(found.distance, travel),
+            None => Some(false),
         }
     }
 
-    fn sift_objects(&mut self, capsule: &Placed, travel: f64, objects: &mut u64) -> bool {
-        let reach = self.margin + capsule.radius + travel;
+    fn sift_objects(&mut self, arm: &PlacedArm, body: usize, travel: f64, objects: &mut u64) -> bool {
+        let body = &arm.bodies()[body];
+        let scene = self.monitor.scene();
         let mut left = *objects;
         while left != 0 {
             let index = left.trailing_zeros() as usize;
             left &= left - 1;
-            let (centre, half) = &self.monitor.bounds[index];
+            let reach = self.margin + body.radius + scene.around(index) + travel;
             let mut keep = false;
-            if squared_gap(&capsule.centre, &capsule.half, centre, half) < reach * reach {
-                let near = self.monitor.obstacles[index].near_capsule(&capsule.ends, capsule.radius);
+            if scene.squared_gap(index, &body.centre, &body.half) < reach * reach
+                && let Some(near) = arm.near(body, &scene.all()[index], self.wanted(travel))
+            {
                 match self.weigh(near.distance, travel) {
                     Some(kept) => keep = kept,
                     None => return false,
@@ -318,49 +343,9 @@ impl Look<'_> {
         true
     }
 
-    fn sift_part(&mut self, part: &OrientedBox, placed: &[Placed; LINK_CAPSULES_MAX], pairs: &mut Pairs) -> bool {
-        let last = self.poses.count.min(JOINTS_MAX);
-        let half = part.half_in_base();
-        let around = part.half.norm();
-        let travel = self.wander.of(&[part.centre], around, 0, last);
-        let reach = self.margin + travel;
-        let mut left = pairs.part_objects;
-        while left != 0 {
-            let index = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let (centre, bounds) = &self.monitor.bounds[index];
-            let mut keep = false;
-            if squared_gap(&part.centre, &half, centre, bounds) < reach * reach
-                && let Some(near) = self.monitor.obstacles[index].near_box(part, reach)
-            {
-                match self.weigh(near.distance, travel) {
-                    Some(kept) => keep = kept,
-                    None => return false,
-                }
-            }
-            if !keep {
-                pairs.part_objects &= !(1 << index);
-            }
-        }
-        let mut left = pairs.part_capsules;
-        while left != 0 {
-            let index = left.trailing_zeros() as usize;
-            left &= left - 1;
-            let capsule = &placed[index];
-            let mut keep = false;
-            if capsule.link < last {
-                let travel = self.wander.of(&[part.centre], around, capsule.link, last);
-                let distance = part.near_segment(&capsule.ends).distance - capsule.radius;
-                match self.weigh(distance, travel) {
-                    Some(kept) => keep = kept,
-                    None => return false,
-                }
-            }
-            if !keep {
-                pairs.part_capsules &= !(1 << index);
-            }
-        }
-        true
+    /// What is farther than `travel` past the margin is never met, and how far within it does not matter.
+    fn wanted(&self, travel: f64) -> Wanted {
+        Wanted { limit: self.margin + travel, enough: self.margin }
     }
 
     /// Whether a pair this far apart may still meet; `None` when it is too near.

@@ -1,9 +1,11 @@
 //! No query allocates, and none panics, whatever the numbers.
 #![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
 
+use std::sync::Arc;
+
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use tandem_clearance::{ArmBody, LinkCapsule, Monitor};
+use tandem_clearance::{ArmBody, LinkCapsule, Monitor, Shapes};
 use tandem_cycle::guard::{CountingAllocator, counted};
 use tandem_kinematics::{Chain, Joint, JointKind, manipulability};
 use tandem_msg::{AttachedPart, Capsule, Code, Pose, SceneObject};
@@ -36,7 +38,22 @@ fn body(count: usize) -> ArmBody {
         .map(|link| LinkCapsule { link, ends: [[0.0; 3], [0.1, 0.0, 0.2]], radius: 0.03, tool: link == count })
         .collect();
     let pairs: Vec<[usize; 2]> = (0..=count).flat_map(|a| (a + 2..=count).map(move |b| [a, b])).collect();
-    ArmBody::new(&capsules, &pairs).expect("nine capsules are an arm")
+    let mut body = ArmBody::new(&capsules, &pairs).expect("nine capsules are an arm");
+    for index in (1..=count).step_by(2) {
+        body.refine(index, 1).expect("a capsule of the arm");
+    }
+    body
+}
+
+/// A hull that fits the links' capsules, a mesh that is a solid and one that is not.
+fn shapes() -> Shapes {
+    let mut shapes = Shapes::new();
+    let corners = [[0.0, 0.0, -0.02], [0.0, 0.02, 0.0], [0.02, 0.0, 0.01], [0.1, 0.0, 0.22]];
+    shapes.add_hull(&corners).expect("four points are a hull");
+    let faces = [[0, 1, 2], [0, 3, 1], [0, 2, 3], [1, 3, 2]];
+    shapes.add_mesh(&corners, &faces).expect("a tetrahedron is a mesh");
+    shapes.add_mesh(&corners, &faces[..2]).expect("two triangles are a mesh");
+    shapes
 }
 
 /// Numbers as a faulty peer may send them, mostly of the size of a cell.
@@ -64,12 +81,13 @@ fn pose() -> impl Strategy<Value = Pose> {
 }
 
 fn objects() -> impl Strategy<Value = Vec<SceneObject>> {
-    let object = (0..5_u32, three(), pose()).prop_map(|(shape, size, base_from_object)| SceneObject {
-        id: 0,
-        shape: Code::from_raw(shape),
-        size: size.map(f64::abs),
-        base_from_object,
-    });
+    let object =
+        (0..6_u32, 1..4_u32, three(), pose()).prop_map(|(shape, number, size, base_from_object)| SceneObject {
+            id: 0,
+            shape: Code::from_raw(shape),
+            size: if shape == 4 { [f64::from(number), 0.0, 0.0] } else { size.map(f64::abs) },
+            base_from_object,
+        });
     prop::collection::vec(object, 0..12).prop_map(|mut objects| {
         for (index, object) in objects.iter_mut().enumerate() {
             object.id = index as u32 + 1;
@@ -102,11 +120,12 @@ proptest! {
         half_extents in three(),
         place in pose(),
         margin in number(),
+        shape in 0..3_u32,
     ) {
-        let (chain, body) = (chain(count), body(count));
-        let part = AttachedPart { present: 1, half_extents, tcp_from_part: place, ..AttachedPart::default() };
+        let (chain, body, shapes) = (chain(count), body(count), Arc::new(shapes()));
+        let part = AttachedPart { present: 1, shape, half_extents, tcp_from_part: place, ..AttachedPart::default() };
         let (distances, calls) = counted(|| {
-            let mut monitor = Monitor::new(body);
+            let Ok(mut monitor) = Monitor::with_shapes(body, shapes.clone()) else { panic!("the hull fits") };
             let _ = monitor.set_scene(&objects);
             monitor.set_human(&people);
             monitor.set_attached(Some(&part));

@@ -48,7 +48,7 @@ fn shape_of(object: &SceneObject) -> (Box<dyn Shape>, DPose3) {
         // parry's stand along y.
         ShapeKind::Cylinder => (Box::new(Cylinder::new(b, a)), DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2)),
         ShapeKind::Capsule => (Box::new(ParryCapsule::new_z(b, a)), DQuat::IDENTITY),
-        ShapeKind::Sphere => (Box::new(Ball::new(a)), DQuat::IDENTITY),
+        ShapeKind::Sphere | ShapeKind::Registered => (Box::new(Ball::new(a)), DQuat::IDENTITY),
     };
     let mut place = parry(&object.base_from_object);
     place.rotation *= turn;

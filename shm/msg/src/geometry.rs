@@ -53,6 +53,8 @@ coded! {
         Capsule = 2, "capsule";
         /// Radius, unused, unused.
         Sphere = 3, "sphere";
+        /// Number of a hull or mesh that was registered at start, unused, unused.
+        Registered = 4, "registered";
     }
 }
 

@@ -40,14 +40,14 @@ coded! {
     }
 }
 
-/// The part in the tool, as a box around it, for clearance. All zero when nothing is carried.
+/// The part in the tool, as a box around it or a registered hull, for clearance. All zero when nothing is carried.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[repr(C)]
 pub struct AttachedPart {
     /// 1 when a part is carried, else 0.
     pub present: u32,
-    /// Zero; keeps the layout free of padding.
-    pub reserved: u32,
+    /// Number of a hull that was registered at start, when the part is given as one; 0: it is the box.
+    pub shape: u32,
     /// Half extents of the box, metres.
     pub half_extents: [f64; 3],
     /// Its centre and axes.

@@ -1,16 +1,24 @@
-//! Exact distances between a segment and a solid: the core of every query.
+//! Distances between two convex cores: the heart of every query.
 //!
 //! A capsule is a segment with a radius, so its distance is the segment's minus
-//! the radius. Each file is one solid, in the solid's own frame. Distances are
-//! signed: inside a solid they are minus a depth that is at least the true one.
+//! the radius. Segments and boxes have closed forms, one solid a file, in the solid's own
+//! frame; all else goes through [`gjk`]. Distances are signed: where two cores
+//! overlap they are minus a depth that is at least the true one.
 
 mod boxes;
+mod core;
 mod cylinder;
+mod depth;
+mod gjk;
 mod segment;
+mod simplex;
 
+pub(crate) use self::core::{Core, core_to_core};
 pub(crate) use boxes::{OrientedBox, box_to_box};
 pub(crate) use cylinder::segment_to_cylinder;
+pub(crate) use gjk::Wanted;
 pub(crate) use segment::{point_to_segment, segment_to_segment};
+pub(crate) use simplex::nearest_of_triangle;
 
 use nalgebra::Vector3;
 
@@ -29,6 +37,13 @@ pub(crate) struct Near {
 }
 
 impl Near {
+    /// What is not known to be apart.
+    pub(crate) const LOST: Self = Self {
+        distance: f64::NEG_INFINITY,
+        on_first: Vector3::new(0.0, 0.0, 0.0),
+        on_second: Vector3::new(0.0, 0.0, 0.0),
+    };
+
     /// Seen from the other side.
     pub(crate) fn swapped(self) -> Self {
         Self { distance: self.distance, on_first: self.on_second, on_second: self.on_first }

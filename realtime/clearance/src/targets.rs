@@ -1,0 +1,117 @@
+//! What the arm is held against, with boxes around it laid out for vector code.
+
+use nalgebra::Vector3;
+
+use crate::lanes::wide;
+use crate::obstacle::Obstacle;
+
+/// Obstacles whose boxes are looked at in one go.
+pub(crate) const CHUNK: usize = 8;
+
+/// Farther than any scene: where an unused slot is.
+const NOWHERE: f64 = 1e9;
+
+/// Up to `N` obstacles. The box around each obstacle's core lies along the base axes.
+#[derive(Clone, Debug)]
+pub(crate) struct Targets<const N: usize> {
+    obstacles: [Obstacle; N],
+    count: usize,
+    centre: [[f64; N]; 3],
+    half: [[f64; N]; 3],
+    /// Radius around the core.
+    around: [f64; N],
+    around_max: f64,
+}
+
+impl<const N: usize> Targets<N> {
+    pub(crate) const NONE: Self = Self {
+        obstacles: [Obstacle::UNUSED; N],
+        count: 0,
+        centre: [[NOWHERE; N]; 3],
+        half: [[0.0; N]; 3],
+        around: [0.0; N],
+        around_max: 0.0,
+    };
+
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+        self.centre = [[NOWHERE; N]; 3];
+        self.around_max = 0.0;
+    }
+
+    /// Adds one, as long as there is room.
+    pub(crate) fn push(&mut self, obstacle: Obstacle) {
+        let index = self.count;
+        if index < N {
+            let (centre, half, around) = obstacle.bounds();
+            for axis in 0..3 {
+                self.centre[axis][index] = centre[axis];
+                self.half[axis][index] = half[axis];
+            }
+            self.around[index] = around;
+            self.around_max = self.around_max.max(around);
+            self.obstacles[index] = obstacle;
+            self.count += 1;
+        }
+    }
+
+    pub(crate) fn all(&self) -> &[Obstacle] {
+        &self.obstacles[..self.count.min(N)]
+    }
+
+    pub(crate) fn around(&self, index: usize) -> f64 {
+        self.around[index]
+    }
+
+    /// The largest of them.
+    pub(crate) fn around_max(&self) -> f64 {
+        self.around_max
+    }
+
+    /// Squared distances from a box along the base axes to the box around each obstacle's core.
+    #[inline]
+    pub(crate) fn squared_gaps(&self, centre: &Vector3<f64>, half: &Vector3<f64>) -> [f64; N] {
+        let (centre, half) = ([centre.x, centre.y, centre.z], [half.x, half.y, half.z]);
+        wide(move || self.gaps(&centre, &half))
+    }
+
+    /// The least of [`Targets::squared_gaps`].
+    #[inline]
+    pub(crate) fn squared_gap_min(&self, centre: &Vector3<f64>, half: &Vector3<f64>) -> f64 {
+        let (centre, half) = ([centre.x, centre.y, centre.z], [half.x, half.y, half.z]);
+        wide(move || {
+            let gaps = self.gaps(&centre, &half);
+            let mut least = [f64::INFINITY; CHUNK];
+            for chunk in gaps.chunks_exact(CHUNK) {
+                for (least, gap) in least.iter_mut().zip(chunk) {
+                    *least = if *gap < *least { *gap } else { *least };
+                }
+            }
+            least.iter().fold(f64::INFINITY, |least, gap| if *gap < least { *gap } else { least })
+        })
+    }
+
+    #[inline(always)]
+    fn gaps(&self, centre: &[f64; 3], half: &[f64; 3]) -> [f64; N] {
+        const { assert!(N.is_multiple_of(CHUNK)) };
+        let mut gaps = [0.0; N];
+        for axis in 0..3 {
+            for (index, gap) in gaps.iter_mut().enumerate() {
+                let apart = (self.centre[axis][index] - centre[axis]).abs();
+                let apart = apart - (self.half[axis][index] + half[axis]);
+                let apart = if apart > 0.0 { apart } else { 0.0 };
+                *gap += apart * apart;
+            }
+        }
+        gaps
+    }
+
+    /// Squared distance from a box along the base axes to the box around one obstacle's core.
+    pub(crate) fn squared_gap(&self, index: usize, centre: &Vector3<f64>, half: &Vector3<f64>) -> f64 {
+        (0..3).fold(0.0, |sum, axis| {
+            let apart = (self.centre[axis][index] - centre[axis]).abs() - (self.half[axis][index] + half[axis]);
+            let apart = apart.max(0.0);
+            sum + apart * apart
+        })
+    }
+}
