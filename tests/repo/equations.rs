@@ -17,8 +17,6 @@ const NOT_BUILT: &[(u32, &str)] = &[
     (13, "motion: safety"),
     (14, "motion: action"),
     (15, "motion: reward"),
-    (16, "progressive network: linear lateral connections"),
-    (17, "progressive network: adapters"),
 ];
 
 #[test]
