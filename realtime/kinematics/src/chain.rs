@@ -5,7 +5,8 @@ use core::fmt;
 use nalgebra::{Isometry3, Quaternion, Unit, Vector3};
 
 use crate::JOINTS_MAX;
-use crate::inverse::ParallelShoulder;
+use crate::inverse::ClosedForm;
+use crate::tcp::Recursion;
 
 /// How a joint moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -143,8 +144,10 @@ pub struct Chain {
     pub(crate) tool: Isometry3<f64>,
     /// Derived from `joints`, what forward kinematics needs of each.
     pub(crate) links: [LinkConstants; JOINTS_MAX],
+    /// Derived from `joints` and `tool`: the short way to the TCP.
+    pub(crate) recursion: Recursion,
     /// Present when the closed form applies.
-    pub(crate) closed_form: Option<ParallelShoulder>,
+    pub(crate) closed_form: Option<ClosedForm>,
 }
 
 /// Constants of one joint: the local rotation at position q is `at_rest·cos(q/2) + turning·sin(q/2)`.
@@ -195,9 +198,10 @@ impl Chain {
             count: joints.len(),
             tool,
             links: slots.map(|joint| LinkConstants::of(&joint)),
+            recursion: Recursion::of(joints, &tool),
             closed_form: None,
         };
-        chain.closed_form = ParallelShoulder::of(&chain);
+        chain.closed_form = ClosedForm::of(&chain);
         Ok(chain)
     }
 

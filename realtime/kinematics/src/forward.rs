@@ -3,6 +3,7 @@
 use nalgebra::{Isometry3, SMatrix, Translation3, UnitQuaternion, Vector3};
 
 use crate::chain::is_finite;
+use crate::sin_cos::sin_cos;
 use crate::{Chain, JOINTS_MAX, JointKind};
 
 /// TCP twist per joint speed: rows 0–2 linear (m/s), rows 3–5 angular (rad/s), in base axes;
@@ -40,23 +41,22 @@ impl Chain {
             base_from_tcp: Isometry3::identity(),
             count,
         };
+        let (sines, cosines) = sin_cos(&core::array::from_fn(|k| if k < count { 0.5 * position[k] } else { 0.0 }));
         let mut rotation = UnitQuaternion::identity();
         let mut origin = Vector3::zeros();
-        for (((joint, link), &q), pose) in
-            self.joints().iter().zip(&self.links).zip(position).zip(&mut poses.base_from_link[1..])
-        {
+        for (index, (joint, link)) in self.joints().iter().zip(&self.links).enumerate() {
             match joint.kind {
                 JointKind::Revolute => {
-                    let (sin, cos) = (0.5 * q).sin_cos();
+                    let (sin, cos) = (sines[index], cosines[index]);
                     origin += rotation * link.offset;
                     rotation *= UnitQuaternion::new_unchecked(link.at_rest * cos + link.turning * sin);
                 }
                 JointKind::Prismatic => {
-                    origin += rotation * (link.offset + link.axis_in_parent * q);
+                    origin += rotation * (link.offset + link.axis_in_parent * position[index]);
                     rotation *= UnitQuaternion::new_unchecked(link.at_rest);
                 }
             }
-            *pose = Isometry3::from_parts(Translation3::from(origin), rotation);
+            poses.base_from_link[index + 1] = Isometry3::from_parts(Translation3::from(origin), rotation);
         }
         poses.base_from_tcp = poses.base_from_link[count] * self.tool;
         poses

@@ -6,10 +6,11 @@
 //! the TCP move when the joints do ([`Chain::jacobian`]), and which joint
 //! positions bring the TCP to a pose ([`Chain::inverse`]).
 //!
-//! Arms whose joints 2, 3 and 4 are parallel, as the UR series, are recognised
-//! by their geometry and solved in closed form, all branches; every other chain
-//! is solved by damped least squares with a fixed sequence of restarts. The same
-//! question always gets the same answer.
+//! Six-joint arms whose joints 2, 3 and 4 are parallel, as the UR series, and those
+//! whose last three axes meet, as most industrial arms, are recognised by their
+//! geometry and solved in closed form, all branches; every other chain is solved by
+//! damped least squares with a fixed sequence of restarts. The same question always
+//! gets the same answer.
 //!
 //! **Invariant:** nothing here allocates, blocks, reads a clock or panics, and
 //! every loop has a constant bound. A position that is not finite comes back as
@@ -20,6 +21,8 @@
 mod chain;
 mod forward;
 mod inverse;
+mod sin_cos;
+mod tcp;
 
 pub use chain::{Chain, ChainError, Joint, JointKind};
 pub use forward::{Jacobian, LinkPoses, manipulability};

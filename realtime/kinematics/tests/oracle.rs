@@ -1,49 +1,11 @@
 //! Poses, Jacobians and inverse solutions against outside references.
-//!
-//! `data/*_fk.csv`: pinocchio 4.1.0 on the UR5 and Panda of the public package
-//! `example-robot-data` 6.0.0: joint positions, TCP pose, Jacobian in base axes.
 #![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
 
-use std::path::Path;
+mod reference;
 
-use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
+use reference::{ROBOTS, chain, pose, positions, rows};
 use tandem_kinematics::{Chain, IkFailure, JOINTS_MAX, Joint, JointKind};
-
-fn rows(file: &str) -> Vec<Vec<f64>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file);
-    let text = std::fs::read_to_string(&path).expect("reference data is beside the test");
-    let number = |field: &str| field.parse().unwrap_or(f64::NAN);
-    text.lines().skip(1).map(|line| line.split(',').map(number).collect()).collect()
-}
-
-fn pose(n: &[f64]) -> Isometry3<f64> {
-    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(n[6], n[3], n[4], n[5]));
-    Isometry3::from_parts(Translation3::new(n[0], n[1], n[2]), rotation)
-}
-
-fn chain(robot: &str) -> Chain {
-    let rows = rows(&format!("{robot}_chain.csv"));
-    let (tool, joints) = rows.split_last().expect("the tool is the last row");
-    let joint = |row: &Vec<f64>| Joint {
-        kind: JointKind::Revolute,
-        parent_from_joint: pose(&row[1..8]),
-        axis: Unit::new_normalize(Vector3::new(row[8], row[9], row[10])),
-        position_min: row[11].max(-std::f64::consts::PI),
-        position_max: row[12].min(std::f64::consts::PI),
-        velocity_max: row[13],
-        acceleration_max: 10.0,
-        jerk_max: 100.0,
-        effort_max: 100.0,
-    };
-    let joints: Vec<Joint> = joints.iter().map(joint).collect();
-    Chain::new(&joints, pose(&tool[1..8])).expect("a reference robot is a chain")
-}
-
-fn positions(row: &[f64], count: usize) -> [f64; JOINTS_MAX] {
-    let mut position = [0.0; JOINTS_MAX];
-    position[..count].copy_from_slice(&row[..count]);
-    position
-}
 
 fn off_by(chain: &Chain, position: &[f64; JOINTS_MAX], goal: &Isometry3<f64>) -> (f64, f64) {
     let pose = chain.forward(position).base_from_tcp;
@@ -54,13 +16,19 @@ fn off_by(chain: &Chain, position: &[f64; JOINTS_MAX], goal: &Isometry3<f64>) ->
 /// TCP pose and Jacobian agree to 1e-9 on six and on seven joints.
 #[test]
 fn poses_and_jacobians_agree_with_the_reference() {
-    for (robot, count) in [("ur5", 6), ("panda", 7)] {
+    for (robot, count) in ROBOTS {
         let chain = chain(robot);
         let rows = rows(&format!("{robot}_fk.csv"));
         assert!(rows.len() > 100, "{robot}: {} rows", rows.len());
         for (index, row) in rows.iter().enumerate() {
             let position = positions(row, count);
             let (poses, jacobian) = chain.jacobian(&position);
+            let (tcp, short) = chain.tcp_jacobian(&position);
+            assert!(
+                (tcp.to_homogeneous() - poses.base_from_tcp.to_homogeneous()).amax() < 1e-14,
+                "{robot} row {index}"
+            );
+            assert!((short - jacobian).amax() < 1e-14, "{robot} row {index}: {short} {jacobian}");
             let reference = pose(&row[count..count + 7]);
             let (shift, turn) = off_by(&chain, &position, &reference);
             // A rotation error is measured through acos, which halves the digits.
@@ -203,7 +171,7 @@ fn an_arm_on_a_rail_is_solved() {
 /// Velocities of points of the arm agree with differences of their positions.
 #[test]
 fn point_velocities_agree_with_motion() {
-    for (robot, count) in [("ur5", 6), ("panda", 7)] {
+    for (robot, count) in ROBOTS {
         let chain = chain(robot);
         for row in rows(&format!("{robot}_fk.csv")).iter().step_by(10) {
             let position = positions(row, count);

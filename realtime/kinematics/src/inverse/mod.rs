@@ -1,21 +1,70 @@
 //! Which joint positions bring the TCP to a pose.
 
+mod axes;
 mod numeric;
 mod parallel_shoulder;
+mod spherical_wrist;
 
 use core::fmt;
 
-use nalgebra::{Isometry3, SVector, Vector3};
+use nalgebra::Isometry3;
 
 use crate::chain::is_finite;
 use crate::{Chain, JOINTS_MAX};
 
-pub(crate) use parallel_shoulder::ParallelShoulder;
+use axes::Axes;
+use parallel_shoulder::ParallelShoulder;
+use spherical_wrist::SphericalWrist;
 
 /// Solutions one question may have: 2 shoulders × 2 elbows × 2 wrists.
 const BRANCHES_MAX: usize = 8;
 /// A solution is one whose TCP is off by no more than this, metres and radians.
 const TOLERANCE: f64 = 1e-8;
+
+/// What a closed form proposes, limits aside.
+type Candidates = [Option<[f64; JOINTS_MAX]>; BRANCHES_MAX];
+
+/// The geometry of a chain that can be solved without a search.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum ClosedForm {
+    /// Joints 2, 3 and 4 are parallel, as of the UR series.
+    ParallelShoulder(ParallelShoulder),
+    /// The last three axes meet.
+    SphericalWrist(SphericalWrist),
+}
+
+impl ClosedForm {
+    /// The closed form of a chain, if it has one.
+    pub(crate) fn of(chain: &Chain) -> Option<Self> {
+        let axes = Axes::of(chain)?;
+        let parallel = ParallelShoulder::of(axes).map(Self::ParallelShoulder);
+        parallel.or_else(|| SphericalWrist::of(axes).map(Self::SphericalWrist))
+    }
+
+    /// All branches within limits, nearest to `near` first.
+    fn solve(&self, chain: &Chain, goal: &Isometry3<f64>, near: &[f64; JOINTS_MAX]) -> Result<Branches, IkFailure> {
+        let candidates = match self {
+            Self::ParallelShoulder(form) => form.candidates(goal, near),
+            Self::SphericalWrist(form) => form.candidates(goal, near),
+        };
+        let mut branches = Branches::NONE;
+        let mut beyond_limits = false;
+        for mut solution in candidates.into_iter().flatten() {
+            if !numeric::polish(chain, goal, &mut solution, TOLERANCE) {
+                continue;
+            }
+            match chain.within_limits(&solution, near) {
+                Some(solution) => branches.insert(&solution, near),
+                None => beyond_limits = true,
+            }
+        }
+        match (branches.count, beyond_limits) {
+            (0, true) => Err(IkFailure::JointLimit),
+            (0, false) => Err(IkFailure::Unreachable),
+            _ => Ok(branches),
+        }
+    }
+}
 
 /// Why no joint position was found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,6 +103,12 @@ pub struct Branches {
 impl Branches {
     const NONE: Self =
         Self { solutions: [[0.0; JOINTS_MAX]; BRANCHES_MAX], distances: [f64::INFINITY; BRANCHES_MAX], count: 0 };
+
+    fn one(solution: &[f64; JOINTS_MAX]) -> Self {
+        let mut one = Self { count: 1, ..Self::NONE };
+        one.solutions[0] = *solution;
+        one
+    }
 
     /// The solutions, rad or m, nearest to the seed first (Euclidean distance of joint positions).
     pub fn as_slice(&self) -> &[[f64; JOINTS_MAX]] {
@@ -102,6 +157,27 @@ impl Chain {
     /// # Errors
     /// What [`IkFailure`] names.
     pub fn branches(&self, goal: &Isometry3<f64>, seed: &[f64; JOINTS_MAX]) -> Result<Branches, IkFailure> {
+        let near = self.checked_question(goal, seed)?;
+        match &self.closed_form {
+            Some(form) => form.solve(self, goal, &near),
+            None => numeric::solve(self, goal, &near).map(|solution| Branches::one(&solution)),
+        }
+    }
+
+    /// As [`Chain::inverse`], by the numeric search alone, whether there is a closed form or not.
+    ///
+    /// # Errors
+    /// What [`IkFailure`] names.
+    pub fn search(&self, goal: &Isometry3<f64>, seed: &[f64; JOINTS_MAX]) -> Result<[f64; JOINTS_MAX], IkFailure> {
+        numeric::solve(self, goal, &self.checked_question(goal, seed)?)
+    }
+
+    /// The seed with 0 past the joints in use.
+    fn checked_question(
+        &self,
+        goal: &Isometry3<f64>,
+        seed: &[f64; JOINTS_MAX],
+    ) -> Result<[f64; JOINTS_MAX], IkFailure> {
         let count = self.joint_count();
         let seed_is_finite = seed[..count].iter().all(|q| q.is_finite());
         let rotation_is_unit = (goal.rotation.norm() - 1.0).abs() < 1e-5;
@@ -110,17 +186,7 @@ impl Chain {
         }
         let mut near = [0.0; JOINTS_MAX];
         near[..count].copy_from_slice(&seed[..count]);
-        match &self.closed_form {
-            Some(form) => form.solve(self, goal, &near),
-            None => numeric::solve(self, goal, &near),
-        }
-    }
-
-    /// What is left to do from `pose` to `goal`: metres and radians, in base axes.
-    fn residual(pose: &Isometry3<f64>, goal: &Isometry3<f64>) -> SVector<f64, 6> {
-        let shift = goal.translation.vector - pose.translation.vector;
-        let turn: Vector3<f64> = (goal.rotation * pose.rotation.inverse()).scaled_axis();
-        SVector::<f64, 6>::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
+        Ok(near)
     }
 
     /// The solution with every turn chosen within limits and near the seed.
