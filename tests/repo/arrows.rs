@@ -10,16 +10,12 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("realtime/kinematics", &[]),
     ("realtime/cycle", &["tandem-msg"]),
     ("realtime/clearance", &["tandem-msg", "tandem-kinematics"]),
-<<<<<<< HEAD
     ("realtime/planner", &["tandem-kinematics", "tandem-clearance"]),
+    ("realtime/policy", &[]),
     (
         "realtime/controller",
         &["tandem-msg", "tandem-trajectory", "tandem-kinematics", "tandem-clearance", "tandem-planner"],
     ),
-=======
-    ("realtime/policy", &[]),
-    ("realtime/controller", &["tandem-msg", "tandem-trajectory", "tandem-kinematics", "tandem-clearance"]),
->>>>>>> 583bf38 (Policy crate: progressive networks with linear and adapted lateral connections, evaluated without allocation, the same bits at any vector width)
     ("config", &["tandem-msg", "tandem-kinematics", "tandem-clearance", "tandem-controller"]),
     ("benches/peers", &[]),
 ];
