@@ -1,4 +1,6 @@
-//! `tandem doctor`: what this host offers a realtime loop, and how to mend what it lacks.
+//! `tandem doctor`: what this host offers a realtime loop and a cell, and how to mend what it lacks.
+
+use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
@@ -6,33 +8,48 @@ use serde_json::json;
 use super::exit;
 use crate::doctor::{self, Verdict};
 
+const HELP: &str = "Verdicts: ok; unknown: could not be found out; degraded: a cell runs, with less certainty; bad: a \
+cell does not run. What comes first is to be mended first.\n\nExit codes: 0 nothing is bad, 1 something is bad, 2 usage";
+
 #[derive(Args)]
+#[command(after_help = HELP)]
 pub(super) struct DoctorArgs {
+    /// Cell file whose files, model and database are looked at too
+    cell: Option<PathBuf>,
     /// Print one JSON object a line
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn doctor(args: &DoctorArgs) -> u8 {
-    let checks = doctor::examine();
+    let checks = doctor::examine(args.cell.as_deref());
+    let count = |verdict| checks.iter().filter(|check| check.verdict == verdict).count();
     for check in &checks {
         if args.json {
             let mut line = serde_json::to_value(check).unwrap_or_default();
             line["event"] = json!("check");
             anstream::println!("{line}");
         } else {
-            let word = match check.verdict {
-                Verdict::Ok => "ok",
-                Verdict::Degraded => "degraded",
-                Verdict::Failed => "FAILED",
-            };
-            anstream::println!("{word:9} {:18} {}", check.name, check.found);
+            anstream::println!("{:9} {:20} {}", word(check.verdict), check.name, check.found);
             if let Some(fix) = &check.fix {
-                anstream::println!("{:28} {}", "", check.matters);
-                anstream::println!("{:28} -> {fix}", "");
+                anstream::println!("{:30} {}", "", check.matters);
+                anstream::println!("{:30} -> {fix}", "");
             }
         }
     }
-    let failed = checks.iter().any(|check| check.verdict == Verdict::Failed);
-    if failed { exit::FAILED } else { exit::OK }
+    if !args.json {
+        let verdicts = [Verdict::Ok, Verdict::Unknown, Verdict::Degraded, Verdict::Bad];
+        let counts = verdicts.map(|verdict| format!("{} {}", count(verdict), word(verdict)));
+        anstream::println!("\n{} checks: {}", checks.len(), counts.join(", "));
+    }
+    if count(Verdict::Bad) > 0 { exit::FAILED } else { exit::OK }
+}
+
+fn word(verdict: Verdict) -> &'static str {
+    match verdict {
+        Verdict::Ok => "ok",
+        Verdict::Unknown => "unknown",
+        Verdict::Degraded => "degraded",
+        Verdict::Bad => "BAD",
+    }
 }

@@ -1,95 +1,127 @@
-//! Where memory comes from, and how fast.
+//! Where memory comes from, how fast, and whether it stays.
 
-use std::path::Path;
+use super::host::chosen;
+use super::{Check, Host, Subject};
 
-use super::{Check, Host, chosen};
-
-/// A cell takes about 20 MB; two and some room.
+/// A cell takes about 20 MB of shared memory; two and some room.
 const SHARED_WANTED: u64 = 64 << 20;
 const SHARED_NEEDED: u64 = 24 << 20;
+/// The four processes of a cell take about half of this, kB.
+const AVAILABLE_WANTED: u64 = 1 << 20;
+
+pub(super) fn available(host: &Host) -> Check {
+    let it = Subject("memory", "when memory runs out the kernel ends a process, and it may be the controller");
+    let text = host.read("proc/meminfo").unwrap_or_default();
+    let kilobytes = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"));
+    match kilobytes.and_then(|rest| rest.split_whitespace().next()?.parse::<u64>().ok()) {
+        None => it.not_told("/proc"),
+        Some(kilobytes) => {
+            let found = format!("{} MB available", kilobytes >> 10);
+            if kilobytes >= AVAILABLE_WANTED {
+                it.ok(found)
+            } else {
+                it.degraded(found, "end other programs, or add memory")
+            }
+        }
+    }
+}
 
 pub(super) fn huge_pages(host: &Host) -> Check {
-    const NAME: &str = "huge_pages";
-    let matters = "the kernel stops a process to merge its pages into large ones";
+    let it = Subject("huge_pages", "the kernel stops a process to merge its pages into large ones");
     let line = host.read("sys/kernel/mm/transparent_hugepage/enabled");
     match line.as_deref().and_then(chosen) {
-        Some("always") => Check::degraded(
-            NAME,
+        Some("always") => it.degraded(
             "always",
-            matters,
             "echo madvise > /sys/kernel/mm/transparent_hugepage/enabled, or boot with transparent_hugepage=madvise",
         ),
-        Some(other) => Check::ok(NAME, other, matters),
-        None => Check::ok(NAME, "the kernel has none", matters),
+        Some(other) => it.ok(other),
+        None => it.ok("the kernel has none"),
+    }
+}
+
+/// Balancing between memories and merging of equal pages take pages away while a loop uses them.
+pub(super) fn page_moving(host: &Host) -> Check {
+    let it = Subject("page_moving", "a page that the kernel moves or merges faults when a loop touches it next");
+    let balancing = host.number("proc/sys/kernel/numa_balancing").is_some_and(|on| on != 0);
+    let merging = host.number("sys/kernel/mm/ksm/run") == Some(1);
+    let fixes: Vec<&str> = [
+        balancing.then_some("sysctl -w kernel.numa_balancing=0"),
+        merging.then_some("echo 2 > /sys/kernel/mm/ksm/run"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    match (balancing, merging) {
+        (false, false) => it.ok("none"),
+        (true, false) => it.degraded("NUMA balancing", fixes.join("; ")),
+        (false, true) => it.degraded("merging of equal pages", fixes.join("; ")),
+        (true, true) => it.degraded("NUMA balancing, merging of equal pages", fixes.join("; ")),
     }
 }
 
 pub(super) fn swap(host: &Host) -> Check {
-    const NAME: &str = "swap";
-    let matters = "memory that was swapped out is fetched from disk in the middle of a cycle";
-    let Some(table) = host.read("proc/swaps") else {
-        return Check::ok(NAME, "none", matters);
-    };
+    let it = Subject("swap", "memory that was swapped out is fetched from disk in the middle of a cycle");
+    let table = host.read("proc/swaps").unwrap_or_default();
     let devices: Vec<&str> = table.lines().skip(1).filter_map(|line| line.split_whitespace().next()).collect();
     if devices.is_empty() {
-        Check::ok(NAME, "none", matters)
+        it.ok("none")
     } else {
-        let fix = "swapoff -a, or see to it that memory may be locked (memory_lock)";
-        Check::degraded(NAME, devices.join(", "), matters, fix)
+        it.degraded(devices.join(", "), "swapoff -a, or see to it that memory may be locked (memory_lock)")
     }
 }
 
-pub(super) fn shared_memory(mount: &Path) -> Check {
-    const NAME: &str = "shared_memory";
-    let matters = "all messages of a cell lie here; when it is full, processes die of SIGBUS";
-    let Ok(space) = rustix::fs::statvfs(mount) else {
-        let fix = "mount -t tmpfs tmpfs /dev/shm";
-        return Check::failed(NAME, format!("{} is not mounted", mount.display()), matters, fix);
+pub(super) fn shared_memory(host: &Host) -> Check {
+    let it = Subject("shared_memory", "all messages of a cell lie here; when it is full, processes die of SIGBUS");
+    let Some(free) = host.shared_free else {
+        return it.bad("/dev/shm is not mounted", "mount -t tmpfs tmpfs /dev/shm");
     };
-    judge_space(space.f_bavail.saturating_mul(space.f_frsize), matters)
-}
-
-fn judge_space(free: u64, matters: &'static str) -> Check {
-    const NAME: &str = "shared_memory";
     let found = format!("{} MB free", free >> 20);
     let fix = "mount -o remount,size=256M /dev/shm; in a container: --shm-size 256m";
     if free >= SHARED_WANTED {
-        Check::ok(NAME, found, matters)
+        it.ok(found)
     } else if free >= SHARED_NEEDED {
-        Check::degraded(NAME, found, matters, fix)
+        it.degraded(found, fix)
     } else {
-        Check::failed(NAME, found, matters, fix)
+        it.bad(found, fix)
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::doctor::Verdict;
-    use crate::doctor::tests::FakeHost;
-
-    #[test]
-    fn pages_merged_behind_our_back_are_named() {
-        const FILE: &str = "sys/kernel/mm/transparent_hugepage/enabled";
-        let judged = |text| huge_pages(&FakeHost::new().with(FILE, text).host()).verdict;
-        assert_eq!(judged("[always] madvise never"), Verdict::Degraded);
-        assert_eq!(judged("always [madvise] never"), Verdict::Ok);
+pub(super) fn shared_memory_mount(host: &Host) -> Check {
+    let it = Subject("shared_memory_mount", "messages on a disk would be written back to it while a loop waits");
+    let mounts = host.read("proc/mounts").unwrap_or_default();
+    // A later mount hides an earlier one.
+    let mount = mounts.lines().rev().find_map(|line| {
+        let mut fields = line.split_whitespace().skip(1);
+        (fields.next()? == "/dev/shm").then(|| (fields.next().unwrap_or_default(), fields.next().unwrap_or_default()))
+    });
+    let fix = "mount -t tmpfs -o rw,nosuid,nodev tmpfs /dev/shm";
+    match mount {
+        Some((_, options)) if options.split(',').any(|option| option == "ro") => {
+            it.bad("mounted for reading only", fix)
+        }
+        Some(("tmpfs", _)) => it.ok("tmpfs"),
+        Some((kind, _)) => it.degraded(kind, fix),
+        None if mounts.is_empty() => it.not_told("/proc"),
+        None => it.degraded("no mount of its own", fix),
     }
+}
 
-    #[test]
-    fn swap_devices_are_listed() {
-        let table = "Filename Type Size Used Priority\n/dev/sda2 partition 1 0 -2\n/swapfile file 1 0 -3\n";
-        let check = swap(&FakeHost::new().with("proc/swaps", table).host());
-        assert_eq!((check.verdict, check.found.as_str()), (Verdict::Degraded, "/dev/sda2, /swapfile"));
-        let none = FakeHost::new().with("proc/swaps", "Filename Type Size Used Priority\n");
-        assert_eq!(swap(&none.host()).verdict, Verdict::Ok);
+/// systemd's log-in manager removes a user's shared memory when they log out, unless told otherwise.
+pub(super) fn remove_ipc(host: &Host) -> Check {
+    let it = Subject("remove_ipc", "systemd may delete the shared memory of a running cell when its user logs out");
+    if !host.root.join("run/systemd/system").is_dir() {
+        return it.ok("systemd does not run here");
     }
-
-    #[test]
-    fn too_little_shared_memory_is_a_failure() {
-        assert_eq!(judge_space(16 << 20, "").verdict, Verdict::Failed);
-        assert_eq!(judge_space(32 << 20, "").verdict, Verdict::Degraded);
-        assert_eq!(judge_space(1 << 30, "").found, "1024 MB free");
-        assert_eq!(shared_memory(Path::new("/no/such/mount")).verdict, Verdict::Failed);
+    let drop_ins =
+        host.list("etc/systemd/logind.conf.d").into_iter().map(|name| format!("etc/systemd/logind.conf.d/{name}"));
+    let files = std::iter::once("etc/systemd/logind.conf".to_owned()).chain(drop_ins);
+    let text: String = files.filter_map(|file| host.read(&file)).fold(String::new(), |all, text| all + &text + "\n");
+    // What is said last holds.
+    match text.lines().rev().find_map(|line| line.trim().strip_prefix("RemoveIPC=")) {
+        Some("no" | "false" | "0" | "off") => it.ok("RemoveIPC=no"),
+        said => it.degraded(
+            format!("RemoveIPC={}", said.unwrap_or("yes, as no file says otherwise")),
+            "set RemoveIPC=no in /etc/systemd/logind.conf and restart systemd-logind; or run the cell as a system user",
+        ),
     }
 }

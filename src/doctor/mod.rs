@@ -1,20 +1,31 @@
 //! What this host offers a realtime loop and a cell, and how to mend what it lacks.
 //!
-//! [`examine`] looks, and answers with data; printing is the command line's
-//! business. What can be tried is tried (scheduling, locking, waking up, flushing
-//! to disk) rather than concluded from a version number. The checks come in the
-//! order in which they depend on each other, so the first that fails is the one to mend.
+//! First everything is looked at and, where it can be, tried (scheduling, locking, waking up, flushing to disk):
+//! that is a [`Host`]. Then [`CHECKS`] judge it, which neither wait nor change anything, so that a test may hand
+//! them a host of its own making. Printing is the command line's business.
+//!
+//! The checks come in the order in which they depend on each other: processors and clocks, the kernel, what this
+//! user may do, memory, files, the cell, and last a trial of the loop itself, which all the others may spoil. So the
+//! first that is not well is the one to mend.
 
+mod cell;
+mod host;
+mod idle;
 mod kernel;
 mod limits;
 mod machine;
 mod memory;
+mod processors;
 mod storage;
-mod trial;
+#[cfg(test)]
+mod tests;
+mod wake_up;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
+
+use host::Host;
 
 /// How a check came out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -22,10 +33,12 @@ use serde::Serialize;
 pub enum Verdict {
     /// As a cell wants it.
     Ok,
+    /// It could not be found out.
+    Unknown,
     /// A cell runs, with less certainty.
     Degraded,
     /// A cell does not run.
-    Failed,
+    Bad,
 }
 
 /// One check.
@@ -43,123 +56,78 @@ pub struct Check {
     pub fix: Option<String>,
 }
 
-impl Check {
-    fn ok(name: &'static str, found: impl Into<String>, matters: &'static str) -> Self {
-        Self { name, verdict: Verdict::Ok, found: found.into(), matters, fix: None }
+/// What a check is about: its name, and why it matters.
+#[derive(Clone, Copy)]
+struct Subject(&'static str, &'static str);
+
+impl Subject {
+    fn ok(self, found: impl Into<String>) -> Check {
+        Check { name: self.0, verdict: Verdict::Ok, found: found.into(), matters: self.1, fix: None }
     }
 
-    fn degraded(name: &'static str, found: impl Into<String>, matters: &'static str, fix: impl Into<String>) -> Self {
-        Self { name, verdict: Verdict::Degraded, found: found.into(), matters, fix: Some(fix.into()) }
+    fn unknown(self, found: impl Into<String>, fix: impl Into<String>) -> Check {
+        self.not_well(Verdict::Unknown, found, fix)
     }
 
-    fn failed(name: &'static str, found: impl Into<String>, matters: &'static str, fix: impl Into<String>) -> Self {
-        Self { name, verdict: Verdict::Failed, found: found.into(), matters, fix: Some(fix.into()) }
-    }
-}
-
-/// The files the kernel tells about itself in; a test puts its own there.
-#[derive(Clone, Debug)]
-struct Host {
-    root: PathBuf,
-}
-
-impl Host {
-    fn this() -> Self {
-        Self { root: PathBuf::from("/") }
+    fn degraded(self, found: impl Into<String>, fix: impl Into<String>) -> Check {
+        self.not_well(Verdict::Degraded, found, fix)
     }
 
-    /// A file's text without the white space around it; `None` when it cannot be read.
-    fn read(&self, path: &str) -> Option<String> {
-        std::fs::read_to_string(self.root.join(path)).ok().map(|text| text.trim().to_owned())
+    fn bad(self, found: impl Into<String>, fix: impl Into<String>) -> Check {
+        self.not_well(Verdict::Bad, found, fix)
     }
 
-    /// A file's number.
-    fn number(&self, path: &str) -> Option<i64> {
-        self.read(path)?.parse().ok()
+    fn not_well(self, verdict: Verdict, found: impl Into<String>, fix: impl Into<String>) -> Check {
+        Check { name: self.0, verdict, found: found.into(), matters: self.1, fix: Some(fix.into()) }
     }
 
-    /// Names in a folder, sorted.
-    fn list(&self, path: &str) -> Vec<String> {
-        let entries = std::fs::read_dir(self.root.join(path)).into_iter().flatten().flatten();
-        let mut names: Vec<_> = entries.filter_map(|entry| entry.file_name().into_string().ok()).collect();
-        names.sort();
-        names
+    /// The kernel has no such file.
+    fn not_told(self, mount: &str) -> Check {
+        self.unknown("not told by the kernel", format!("mount {mount}"))
     }
 }
 
-/// The word in brackets, as in `always [madvise] never`.
-fn chosen(line: &str) -> Option<&str> {
-    line.split_once('[')?.1.split_once(']').map(|(word, _)| word)
-}
+/// All checks, in the order in which they depend on each other.
+const CHECKS: [fn(&Host) -> Check; 34] = [
+    processors::count,
+    processors::quota,
+    processors::load,
+    processors::steal,
+    processors::siblings,
+    processors::isolation,
+    processors::interrupts,
+    machine::clocksource,
+    machine::tsc,
+    machine::timer_resolution,
+    machine::governor,
+    idle::states,
+    idle::request,
+    kernel::preemption,
+    kernel::throttling,
+    limits::fifo,
+    limits::timer_slack,
+    limits::memory_lock,
+    limits::open_files,
+    memory::available,
+    memory::huge_pages,
+    memory::page_moving,
+    memory::swap,
+    memory::shared_memory,
+    memory::shared_memory_mount,
+    memory::remove_ipc,
+    storage::run_directory,
+    storage::leftovers,
+    storage::disk,
+    storage::flush,
+    cell::files,
+    cell::model,
+    cell::database,
+    wake_up::wake_up,
+];
 
-/// Looks at this host. Takes about a second; needs no rights, though with some it sees more.
-pub fn examine() -> Vec<Check> {
-    let host = Host::this();
-    vec![
-        machine::processors(),
-        machine::clocksource(&host),
-        machine::timer_resolution(),
-        machine::governor(&host),
-        machine::steal(&host),
-        kernel::preemption(&host),
-        kernel::throttling(&host),
-        limits::fifo(),
-        limits::memory_lock(),
-        limits::open_files(),
-        memory::huge_pages(&host),
-        memory::swap(&host),
-        memory::shared_memory(Path::new("/dev/shm")),
-        storage::run_directory(),
-        storage::leftovers(),
-        storage::flush(&storage::state_folder()),
-        trial::wake_up(),
-    ]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::fs;
-    use tempfile::TempDir;
-
-    /// A host whose kernel tells what the test wants.
-    pub(super) struct FakeHost(TempDir);
-
-    impl FakeHost {
-        pub(super) fn new() -> Self {
-            Self(TempDir::new().expect("a temporary directory"))
-        }
-
-        pub(super) fn with(self, path: &str, text: &str) -> Self {
-            let file = self.0.path().join(path);
-            fs::create_dir_all(file.parent().expect("a folder")).expect("writable");
-            fs::write(file, text).expect("writable");
-            self
-        }
-
-        pub(super) fn host(&self) -> Host {
-            Host { root: self.0.path().to_owned() }
-        }
-    }
-
-    /// Every check has its own name, and whatever is not well has a fix.
-    #[test]
-    fn a_host_is_examined_and_every_trouble_has_a_fix() {
-        let checks = examine();
-        let mut names: Vec<_> = checks.iter().map(|check| check.name).collect();
-        names.sort_unstable();
-        names.dedup();
-        assert_eq!(names.len(), checks.len());
-        assert!(checks.len() >= 12);
-        for check in &checks {
-            assert_eq!(check.fix.is_none(), check.verdict == Verdict::Ok, "{check:?}");
-            assert!(!check.found.is_empty(), "{check:?}");
-        }
-    }
-
-    #[test]
-    fn the_chosen_word_stands_in_brackets() {
-        assert_eq!(chosen("always [madvise] never"), Some("madvise"));
-        assert_eq!(chosen("none"), None);
-    }
+/// Looks at this host, and at that cell when one is named. Takes about a second, and up to 3 s when the cell's
+/// database does not answer; needs no rights, though with some it sees more.
+pub fn examine(cell: Option<&Path>) -> Vec<Check> {
+    let host = Host::this(cell);
+    CHECKS.iter().map(|check| check(&host)).collect()
 }

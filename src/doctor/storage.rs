@@ -5,47 +5,46 @@ use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::Check;
+use super::{Check, Host, Subject};
 use crate::live;
 
 /// A step waits for its journal entry; this is hardly felt.
 const FLUSH_GOOD: Duration = Duration::from_millis(30);
 const FLUSHES: usize = 5;
+/// A box leaves a few kB in the journal.
+const DISK_WANTED: u64 = 256 << 20;
 
-pub(super) fn run_directory() -> Check {
-    const NAME: &str = "run_directory";
-    let matters = "a running cell keeps its files here";
-    match live::prepare_base() {
-        Ok(path) => Check::ok(NAME, path.display().to_string(), matters),
-        Err(error) => Check::failed(NAME, error.to_string(), matters, "set XDG_RUNTIME_DIR to a directory of yours"),
+pub(super) fn run_directory(host: &Host) -> Check {
+    let it = Subject("run_directory", "a running cell keeps its files here");
+    match &host.run_directory {
+        Ok(path) => it.ok(path.display().to_string()),
+        Err(error) => it.bad(error, "set XDG_RUNTIME_DIR to a directory of yours"),
     }
 }
 
-pub(super) fn leftovers() -> Check {
-    const NAME: &str = "leftovers";
-    let matters = "a cell that was killed with all its processes leaves files and shared memory";
-    let dead = live::dead_cells();
-    // Running cells have a run directory; a dead one's is listed above.
-    let has_directory = |instance: &str| live::base().join(instance).is_dir();
-    let mut orphans: Vec<String> = tandem_bus::leftovers()
-        .into_iter()
-        .filter(|object| !has_directory(&object.instance))
-        .map(|object| object.instance)
-        .collect();
-    orphans.sort();
-    orphans.dedup();
-    if dead.is_empty() && orphans.is_empty() {
-        return Check::ok(NAME, "none", matters);
+pub(super) fn leftovers(host: &Host) -> Check {
+    let it = Subject("leftovers", "a cell that was killed with all its processes leaves files and shared memory");
+    let names: Vec<&str> = host.dead_cells.iter().chain(&host.orphans).map(String::as_str).collect();
+    if names.is_empty() {
+        return it.ok("none");
     }
-    let names: Vec<String> =
-        dead.iter().filter_map(|path| path.file_name()?.to_str().map(str::to_owned)).chain(orphans.clone()).collect();
-    let fix = if orphans.is_empty() {
+    let fix = if host.orphans.is_empty() {
         "nothing: the next `tandem run` removes them".to_owned()
     } else {
-        let files: Vec<String> = orphans.iter().map(|instance| format!("/dev/shm/tandem-{instance}_*")).collect();
+        let files: Vec<String> = host.orphans.iter().map(|instance| format!("/dev/shm/tandem-{instance}_*")).collect();
         format!("if no other user or container runs these cells: rm {}", files.join(" "))
     };
-    Check::degraded(NAME, names.join(", "), matters, fix)
+    it.degraded(names.join(", "), fix)
+}
+
+/// Cells that have shared memory and no run directory. A running cell has one; a dead one's is told apart.
+pub(super) fn orphans() -> Vec<String> {
+    let has_directory = |instance: &str| live::base().join(instance).is_dir();
+    let objects = tandem_bus::leftovers().into_iter().map(|object| object.instance);
+    let mut orphans: Vec<String> = objects.filter(|instance| !has_directory(instance)).collect();
+    orphans.sort();
+    orphans.dedup();
+    orphans
 }
 
 /// Where the journal lies unless the cell file says otherwise; see [`crate::strategy::store::default_url`].
@@ -55,34 +54,39 @@ pub(super) fn state_folder() -> PathBuf {
     state.map_or_else(std::env::temp_dir, |state| state.join("tandem"))
 }
 
-pub(super) fn flush(folder: &Path) -> Check {
-    const NAME: &str = "flush";
-    let matters = "the next step begins when the journal entry of the last one is on disk";
-    match flush_time(folder) {
+pub(super) fn disk(host: &Host) -> Check {
+    let it = Subject("disk", "when the journal's disk is full, no step may begin");
+    let place = host.state_folder.display();
+    match host.disk_free {
+        Some(free) if free >= DISK_WANTED => it.ok(format!("{} MB free in {place}", free >> 20)),
+        Some(free) => it
+            .degraded(format!("{} MB free in {place}", free >> 20), "make room, or set `[store] url` in the cell file"),
+        None => {
+            it.unknown(format!("{place} cannot be asked"), "make the folder, or set `[store] url` in the cell file")
+        }
+    }
+}
+
+pub(super) fn flush(host: &Host) -> Check {
+    let it = Subject("flush", "the next step begins when the journal entry of the last one is on disk");
+    match &host.flush {
         Ok(time) => {
             let found = format!("{:.1} ms", time.as_secs_f64() * 1e3);
-            if time <= FLUSH_GOOD {
-                Check::ok(NAME, found, matters)
+            if *time <= FLUSH_GOOD {
+                it.ok(found)
             } else {
-                Check::degraded(
-                    NAME,
-                    found,
-                    matters,
-                    "put the journal on a faster disk: `[store] url` in the cell file",
-                )
+                it.degraded(found, "put the journal on a faster disk: `[store] url` in the cell file")
             }
         }
-        Err(error) => Check::failed(
-            NAME,
-            format!("{}: {error}", folder.display()),
-            matters,
+        Err(error) => it.bad(
+            format!("{}: {error}", host.state_folder.display()),
             "make the folder writable, or set `[store] url` in the cell file",
         ),
     }
 }
 
 /// Median time to write a page and have it on disk.
-fn flush_time(folder: &Path) -> io::Result<Duration> {
+pub(super) fn flush_time(folder: &Path) -> io::Result<Duration> {
     fs::create_dir_all(folder)?;
     let path = folder.join(format!(".tandem-doctor-{}", std::process::id()));
     let mut file = File::create(&path)?;
@@ -97,25 +101,4 @@ fn flush_time(folder: &Path) -> io::Result<Duration> {
     let mut times = times?;
     times.sort_unstable();
     Ok(times[FLUSHES / 2])
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::doctor::Verdict;
-
-    #[test]
-    fn a_folder_that_cannot_be_written_is_a_failure_with_its_name() {
-        let folder = tempfile::NamedTempFile::new().expect("a temporary file");
-        let check = flush(folder.path());
-        assert_eq!(check.verdict, Verdict::Failed);
-        assert!(check.found.starts_with(&folder.path().display().to_string()), "{check:?}");
-    }
-
-    #[test]
-    fn a_trial_leaves_no_file() {
-        let folder = tempfile::TempDir::new().expect("a temporary directory");
-        assert_ne!(flush(folder.path()).verdict, Verdict::Failed);
-        assert_eq!(fs::read_dir(folder.path()).expect("readable").count(), 0);
-    }
 }

@@ -34,15 +34,35 @@ fn a_good_cell_passes_the_check() {
 }
 
 #[test]
-fn the_doctor_answers_in_objects() {
-    let answer = Files::new().tandem(&["doctor", "--json"]);
+fn the_doctor_answers_in_objects_and_looks_at_the_cell_it_is_given() {
+    let files = Files::new();
+    let answer = files.tandem(&["doctor", "cells/s471.toml", "--json"]);
     let checks: Vec<serde_json::Value> =
         answer.out.lines().map(|line| serde_json::from_str(line).expect("an object a line")).collect();
-    assert!(checks.len() >= 12, "{answer:?}");
-    for check in checks {
+    assert!(checks.len() >= 30, "{answer:?}");
+    for check in &checks {
         assert_eq!(check["event"], "check");
         assert_eq!(check["verdict"] == "ok", check["fix"].is_null(), "a fix for what is not well: {check}");
     }
+    for name in ["cell", "model", "database"] {
+        let check = checks.iter().find(|check| check["name"] == name).expect("a check of that name");
+        assert_eq!(check["verdict"], "ok", "{check}");
+    }
+}
+
+/// A cell that does not run is bad news, in the exit code too; what depends on its files is unknown then.
+#[test]
+fn the_doctor_has_bad_news_of_a_spoilt_cell() {
+    let files = Files::new();
+    files.replace("cells/s471.toml", "walk_speed_m_s = 1.4", "walk_speed_m_s = 14");
+    let answer = files.tandem(&["doctor", "cells/s471.toml"]);
+    assert_eq!(answer.code, Some(1), "{answer:?}");
+    let line = |name: &str| answer.out.lines().find(|line| line.split_whitespace().nth(1) == Some(name));
+    assert!(
+        line("cell").is_some_and(|line| line.starts_with("BAD") && line.contains("allowed 0.1..=2 m/s")),
+        "{answer:?}"
+    );
+    assert!(line("model").is_some_and(|line| line.starts_with("unknown")), "{answer:?}");
 }
 
 /// One box in lockstep as a script sees it: objects only, the summary last, and the journal agrees.
