@@ -3,11 +3,13 @@
 //! ARCHITECTURE.md says how the parts hang together; each module's first lines
 //! say what it decides and what never happens in it.
 
+pub mod bench;
 pub mod cli;
 pub mod doctor;
 pub mod learning;
 pub mod live;
 pub mod lockstep;
+pub mod observe;
 pub mod perception;
 pub mod plant;
 pub mod roles;

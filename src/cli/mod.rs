@@ -4,6 +4,7 @@
 //! verb that reports takes `--json` and then prints one object a line. Exit codes
 //! are in [`exit`].
 
+mod bench;
 mod check;
 mod doctor;
 pub mod exit;
@@ -11,7 +12,9 @@ mod journal;
 mod progress;
 mod role;
 mod run;
+mod status;
 mod table;
+mod top;
 mod train;
 
 use std::process::ExitCode;
@@ -34,6 +37,12 @@ enum Command {
     Check(check::CheckArgs),
     /// What this host offers a realtime loop, and how to mend what it lacks
     Doctor(doctor::DoctorArgs),
+    /// A running cell at one instant: what is done, how its loops keep their time
+    Status(status::StatusArgs),
+    /// The same on the screen, several times a second
+    Top(top::TopArgs),
+    /// How late loops wake, what messages and cycles cost, beside what others pay, in one run
+    Bench(bench::BenchArgs),
     /// What was done to each box, by whom, when
     Journal(journal::JournalArgs),
     /// Make the trained models that ship in config/models
@@ -41,6 +50,9 @@ enum Command {
     /// One role of a running cell (started by `tandem run`)
     #[command(hide = true)]
     Role(role::RoleArgs),
+    /// The other process of a bench (started by `tandem bench`)
+    #[command(hide = true)]
+    BenchPeer(bench::PeerArgs),
 }
 
 /// Reads the command line, does what it says and answers with the exit code.
@@ -58,9 +70,13 @@ pub fn main() -> ExitCode {
         Command::Run(args) => run::run(&args),
         Command::Check(args) => check::check(&args),
         Command::Doctor(args) => doctor::doctor(&args),
+        Command::Status(args) => status::status(&args),
+        Command::Top(args) => top::top(&args),
+        Command::Bench(args) => bench::bench(&args),
         Command::Journal(args) => journal::journal(&args),
         Command::Train(args) => train::train(&args),
         Command::Role(args) => role::role(&args),
+        Command::BenchPeer(args) => bench::peer(&args),
     };
     code.into()
 }

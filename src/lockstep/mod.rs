@@ -56,6 +56,8 @@ pub struct SimCell {
     lost: [Option<Loss>; 4],
     around: Surroundings,
     now: Stamp,
+    /// Whose turn it was.
+    role: Role,
     boxes: u32,
 }
 
@@ -93,6 +95,7 @@ impl SimCell {
             lost: [None; 4],
             around: Surroundings { roles: [RoleHealth::Up; 4], journal_committed: 0, halt: false },
             now: Stamp::default(),
+            role: Role::Supervisor,
             boxes,
         })
     }
@@ -111,6 +114,11 @@ impl SimCell {
     /// The virtual clock.
     pub fn now(&self) -> Stamp {
         self.now
+    }
+
+    /// The role whose turn the last step was.
+    pub fn role(&self) -> Role {
+        self.role
     }
 
     /// The numbers of the run so far.
@@ -153,7 +161,7 @@ impl SimCell {
     /// A role that could not be started anew.
     pub fn step(&mut self, store: &Store, on_event: &mut dyn FnMut(&Event)) -> Result<Option<Outcome>, SimError> {
         let (role, now) = self.schedule.advance();
-        self.now = now;
+        (self.now, self.role) = (now, role);
         if let Some(loss) = self.lost[role.code() as usize] {
             match loss.back {
                 Some(back) if back <= now => self.restart(role)?,

@@ -7,4 +7,5 @@
 mod endings;
 mod faults;
 mod harness;
+mod looked_at;
 mod whole;

@@ -57,6 +57,22 @@ impl Histogram {
         self.max_ns = self.max_ns.max(other.max_ns);
     }
 
+    /// What was counted since an earlier copy of the same histogram. Unless the maximum has grown
+    /// since, the maximum of the answer is known to its bucket only.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        let mut since = Self::default();
+        let counts = since.counts.iter_mut().zip(self.counts.iter().zip(&earlier.counts)).enumerate();
+        let mut last = 0;
+        for (index, (count, (now, then))) in counts {
+            *count = now.saturating_sub(*then);
+            since.total += *count;
+            last = if *count > 0 { upper(index) } else { last };
+        }
+        since.max_ns = if self.max_ns > earlier.max_ns { self.max_ns } else { last.min(self.max_ns) };
+        since
+    }
+
     /// The buckets that hold something: largest value, nanoseconds, and count.
     pub fn buckets(&self) -> impl Iterator<Item = (u64, u64)> {
         let held = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
@@ -201,6 +217,23 @@ mod tests {
             prop_assert_eq!((sum.total(), sum.max_ns()), (plain.total(), plain.max_ns()));
             prop_assert!(sum.buckets().eq(plain.buckets()));
             prop_assert_eq!(sum.buckets().map(|(_, count)| count).sum::<u64>(), values.len() as u64);
+        }
+
+        /// What came since an earlier copy is what was recorded since.
+        #[test]
+        fn two_copies_tell_what_came_between(before in prop::collection::vec(0u64..1 << 36, 0..99), after in prop::collection::vec(0u64..1 << 36, 0..99)) {
+            let (mut whole, mut part) = (Histogram::default(), Histogram::default());
+            before.iter().for_each(|value| whole.record(*value));
+            let earlier = whole.clone();
+            for value in &after {
+                whole.record(*value);
+                part.record(*value);
+            }
+            let since = whole.since(&earlier);
+            prop_assert_eq!(since.total(), after.len() as u64);
+            prop_assert!(since.counts == part.counts);
+            let max = since.max_ns();
+            prop_assert!(max >= part.max_ns() && max - part.max_ns() <= part.max_ns() / 32, "{max} for {}", part.max_ns());
         }
 
         /// Every value lies in a bucket whose upper end is not below it and whose predecessor's is.

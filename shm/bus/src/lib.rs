@@ -21,6 +21,7 @@
 //! Since iceoryx2 0.10 every loan makes one small heap allocation, so a publish
 //! costs one; reading costs none.
 
+pub mod direct;
 mod error;
 mod instance;
 mod memory;

@@ -1,0 +1,225 @@
+//! A live cell that is measured: started as a user would, in a scratch folder, and asked to end afterwards.
+
+#![allow(unsafe_code)]
+
+use std::fs;
+use std::io::{BufRead as _, BufReader};
+use std::os::unix::process::CommandExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+use hdrhistogram::Histogram;
+use rustix::process::{Pid, Signal, kill_process, set_parent_process_death_signal};
+use serde_json::Value;
+use tandem_bus::{Identity, Node};
+use tandem_config::Cell;
+use tandem_cycle::stats::{Reader, Snapshot};
+use tandem_msg::{Coded as _, Role};
+
+use super::BenchError;
+use super::series::histogram;
+use crate::live::{RunningCell, running_cells};
+
+/// A cell that says nothing for this long has failed.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// More boxes than any bench waits for.
+const BOXES: &str = "1000";
+const JOINING: Duration = Duration::from_secs(5);
+
+/// A cell that runs.
+pub(super) struct LiveCell {
+    child: Child,
+    events: Receiver<Value>,
+    seat: Seat,
+    _scratch: Scratch,
+}
+
+/// Where a running cell is found; any thread may have one.
+#[derive(Clone)]
+pub(super) struct Seat {
+    running: RunningCell,
+    config_hash: u64,
+}
+
+/// A folder of this process, gone with its value.
+pub(super) struct Scratch(PathBuf);
+
+impl Scratch {
+    pub(super) fn new() -> Result<Self, BenchError> {
+        let folder = std::env::temp_dir().join(format!("tandem-bench-{}", std::process::id()));
+        fs::create_dir_all(&folder).map_err(BenchError::io(folder.display().to_string()))?;
+        Ok(Self(folder))
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // What cannot be removed lies in the temporary folder, under our name.
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+impl LiveCell {
+    /// Starts a cell and waits until its arm moves.
+    ///
+    /// # Errors
+    /// The cell's files are refused, or it does not come up.
+    pub(super) fn start(file: &Path, seed: u64) -> Result<Self, BenchError> {
+        let cell = Cell::load(file, None).map_err(BenchError::Config)?;
+        let scratch = Scratch::new()?;
+        let store = format!("sqlite://{}", scratch.0.join("journal.db").display());
+        let mut command = Command::new("/proc/self/exe");
+        command.arg0("tandem").arg("run").arg(file);
+        command.args(["--json", "--boxes", BOXES, "--seed", &seed.to_string(), "--store", &store]);
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null());
+        // SAFETY: between fork and exec one system call is made, on plain numbers.
+        unsafe {
+            // Asked to end in order, when the bench is ended before it has asked itself.
+            command.pre_exec(|| Ok(set_parent_process_death_signal(Some(Signal::TERM))?));
+        }
+        let mut child = command.spawn().map_err(BenchError::io("the live cell"))?;
+        let (told, events) = channel();
+        if let Some(output) = child.stdout.take() {
+            std::thread::spawn(move || {
+                let lines = BufReader::new(output).lines().map_while(Result::ok);
+                // Ends with the cell, or when nobody listens any more.
+                let _ = lines.flat_map(|line| serde_json::from_str(&line)).try_for_each(|event| told.send(event));
+            });
+        }
+        let starting = Starting { child: Some(child), events };
+        starting.wait_for("run_started")?;
+        let pid = starting.pid();
+        let mark = format!("-{pid}-");
+        let running = running_cells().into_iter().find(|cell| cell.name().contains(&mark));
+        let running = running.ok_or_else(|| BenchError::peer("the live cell", "has no run directory"))?;
+        starting.wait_for("action_started")?;
+        let (child, events) = starting.into_parts();
+        Ok(Self { child, events, seat: Seat { running, config_hash: cell.hash }, _scratch: scratch })
+    }
+
+    /// Where it is found.
+    pub(super) fn seat(&self) -> &Seat {
+        &self.seat
+    }
+
+    /// Waits for what the cell tells.
+    ///
+    /// # Errors
+    /// It ends, or says nothing for a long time.
+    pub(super) fn until(&self, what: &str, wanted: impl FnMut(&Value) -> bool) -> Result<Value, BenchError> {
+        until(&self.events, what, wanted)
+    }
+}
+
+impl Seat {
+    /// Its place in the host.
+    pub(super) fn running(&self) -> &RunningCell {
+        &self.running
+    }
+
+    /// Joins its bus to listen.
+    ///
+    /// # Errors
+    /// What the bus says.
+    pub(super) fn join(&self) -> Result<Node, BenchError> {
+        let identity = Identity { role: "bench".to_owned(), epoch: 1, config_hash: self.config_hash };
+        Ok(Node::open(self.running.instance(), identity, JOINING)?)
+    }
+
+    /// The statistics of a role's loop.
+    ///
+    /// # Errors
+    /// They cannot be read.
+    pub(super) fn statistics(&self, role: Role) -> Result<Reader, BenchError> {
+        let failed = |cause: &dyn std::fmt::Display| BenchError::peer(role.name(), format!("statistics: {cause}"));
+        self.running.statistics(role).map_err(|cause| failed(&cause))
+    }
+}
+
+impl Drop for LiveCell {
+    fn drop(&mut self) {
+        end(&mut self.child, &self.events);
+    }
+}
+
+/// A cell that is coming up; ended when it does not.
+struct Starting {
+    child: Option<Child>,
+    events: Receiver<Value>,
+}
+
+impl Starting {
+    fn pid(&self) -> u32 {
+        self.child.as_ref().map_or(0, Child::id)
+    }
+
+    fn wait_for(&self, event: &str) -> Result<Value, BenchError> {
+        until(&self.events, event, |told| told["event"] == event)
+    }
+
+    fn into_parts(mut self) -> (Child, Receiver<Value>) {
+        let child = self.child.take().expect("taken once, here");
+        (child, std::mem::replace(&mut self.events, channel().1))
+    }
+}
+
+impl Drop for Starting {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.child {
+            end(child, &self.events);
+        }
+    }
+}
+
+fn until(events: &Receiver<Value>, what: &str, mut wanted: impl FnMut(&Value) -> bool) -> Result<Value, BenchError> {
+    loop {
+        match events.recv_timeout(PATIENCE) {
+            Ok(event) if wanted(&event) => return Ok(event),
+            Ok(_) => {}
+            Err(RecvTimeoutError::Timeout) => {
+                return Err(BenchError::peer(
+                    "the live cell",
+                    format!("no `{what}` within {PATIENCE:?} of the last event"),
+                ));
+            }
+            Err(RecvTimeoutError::Disconnected) => {
+                let hint = "run it by itself to see why: tandem run CELL.toml";
+                return Err(BenchError::peer("the live cell", format!("has ended before `{what}`; {hint}")));
+            }
+        }
+    }
+}
+
+/// Asks a cell to end and waits until it has.
+fn end(child: &mut Child, events: &Receiver<Value>) {
+    let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
+    let asked = pid.is_some_and(|pid| kill_process(pid, Signal::TERM).is_ok());
+    // It closes its output when it has ended; one that says nothing more hangs.
+    while asked && events.recv_timeout(PATIENCE).is_ok() {}
+    if !matches!(events.recv_timeout(Duration::ZERO), Err(RecvTimeoutError::Disconnected)) {
+        let _ = child.kill();
+    }
+    let _ = child.wait();
+}
+
+/// Reads a loop's statistics, waiting out a beginning incarnation.
+pub(super) fn snapshot(reader: &Reader) -> Box<Snapshot> {
+    let mut snapshot = Box::<Snapshot>::default();
+    while reader.read(&mut snapshot).is_err() {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    snapshot
+}
+
+/// A loop's own histogram, as the benches compare them.
+pub(super) fn converted(counted: &tandem_cycle::Histogram) -> Histogram<u64> {
+    let mut converted = histogram();
+    counted.buckets().for_each(|(value, count)| converted.saturating_record_n(value, count));
+    converted
+}

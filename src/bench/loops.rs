@@ -1,0 +1,107 @@
+//! Loops whose lateness is measured, each on a thread of its own, set up as a role's loop is.
+
+use std::thread;
+use std::time::Duration;
+
+use hdrhistogram::Histogram;
+use rustix::thread::clock_nanosleep_absolute;
+use rustix::time::{ClockId, Timespec};
+use tandem_cycle::setup::{Granted, Policy, Wish, acquire};
+use tandem_cycle::{Clock as _, FixedRate, Grid, Monotonic};
+use tandem_msg::Stamp;
+
+use super::series::histogram;
+use super::{BenchError, Conditions};
+
+/// As the shipped cell's controller.
+pub(super) const PRIORITY: u8 = 80;
+const NANOS: u64 = 1_000_000_000;
+/// Left out at the beginning: caches are cold.
+const WARM_UP: u64 = 20;
+
+/// What the measured threads ask for.
+pub(super) fn wish(cpu: Option<u32>) -> Wish {
+    Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu, lock_memory: true }
+}
+
+/// The processor the loops run on: the one asked for, or the last, which gets the fewest interrupts.
+pub(super) fn processor(asked: Option<u32>) -> Option<u32> {
+    let count = thread::available_parallelism().map_or(1, usize::from);
+    asked.or_else(|| u32::try_from(count - 1).ok())
+}
+
+/// Another processor than that one; none when there is no other.
+pub(super) fn other_processor(cpu: Option<u32>) -> Option<u32> {
+    let count = thread::available_parallelism().map_or(1, usize::from) as u32;
+    (0..count).find(|other| Some(*other) != cpu)
+}
+
+/// Runs something on a thread set up as a role's loop is; notes what was granted.
+///
+/// # Errors
+/// The thread panicked.
+pub(super) fn set_up<R: Send>(
+    cpu: Option<u32>,
+    conditions: &mut Conditions,
+    run: impl FnOnce() -> R + Send,
+) -> Result<R, BenchError> {
+    let (granted, result) = thread::scope(|scope| {
+        let thread = scope.spawn(|| {
+            let granted =
+                acquire(&wish(cpu)).unwrap_or_else(|denied| Granted { notices: denied.0, ..Granted::default() });
+            (granted, run())
+        });
+        thread.join().map_err(|_| BenchError::peer("the measured thread", "has panicked; its message stands above"))
+    })?;
+    conditions.fifo = granted.priority;
+    conditions.memory_locked = granted.locked;
+    conditions.cpu = granted.cpu;
+    Ok(result)
+}
+
+/// Sleeps until absolute deadlines and does nothing else: the least a loop can be. `late` is told of each wake-up,
+/// nanoseconds after its deadline.
+pub(super) fn bare(period: Duration, time: Duration, mut late: impl FnMut(u64)) {
+    let period = period.as_nanos() as u64;
+    let mut clock = Monotonic;
+    let mut deadline = clock.now().0 + period;
+    let cycles = time.as_nanos() as u64 / period;
+    for cycle in 0..cycles + WARM_UP {
+        let at = Timespec { tv_sec: (deadline / NANOS) as i64, tv_nsec: (deadline % NANOS) as i64 };
+        while clock_nanosleep_absolute(ClockId::Monotonic, &at) == Err(rustix::io::Errno::INTR) {}
+        let woken = clock.now().0;
+        if cycle >= WARM_UP {
+            late(woken.saturating_sub(deadline));
+        }
+        while deadline <= woken {
+            deadline += period;
+        }
+    }
+}
+
+/// Our loop around a cycle that does nothing. Lateness of each wake-up, and grid points missed.
+pub(super) fn fixed_rate(mut rate: FixedRate<Monotonic>, time: Duration) -> (Histogram<u64>, u64) {
+    let mut lateness = histogram();
+    let (mut missed, period) = (0, rate.grid().period());
+    let cycles = (time.as_nanos() / period.as_nanos()) as u64;
+    for cycle in 0..cycles + WARM_UP {
+        let tick = rate.wait();
+        if cycle >= WARM_UP {
+            // Of the grid point it was to wake at, not of the last one it slept past.
+            lateness.saturating_record(tick.woken.0 - tick.now.0 + tick.missed * period.as_nanos() as u64);
+            missed += tick.missed;
+        }
+    }
+    (lateness, missed)
+}
+
+/// A loop at that period, on the grid.
+pub(super) fn rate(period: Duration) -> FixedRate<Monotonic> {
+    let grid = Grid::new(period, Duration::ZERO).expect("the command line allows only periods a grid can have");
+    FixedRate::new(grid, Monotonic)
+}
+
+/// The time now.
+pub(super) fn now() -> Stamp {
+    Monotonic.now()
+}
