@@ -21,10 +21,7 @@
 //! a^2 = (beta a0^2 + 2 (v0 - V)) / (alpha + beta)         zeroing -|a| by the jerk arrives at V
 //! ```
 
-use crate::{
-    extremal::{Joint, Phase},
-    sqrt::sqrt,
-};
+use crate::{extremal::Joint, motion::Phase, sqrt::sqrt};
 
 /// Relative excess over a velocity limit that counts as being on it: roundings of the inputs.
 const TIE: f64 = 16.0 * f64::EPSILON;
@@ -41,9 +38,16 @@ pub(crate) struct Prefix {
 }
 
 /// The prefix of a joint starting at `joint.start`; `velocity_min` is its lowest velocity. `soft` asks
-/// for a return to the velocity limit that does not dip below it.
-pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Prefix {
-    let velocity = joint.start[0];
+/// for a return to the velocity limit that does not dip below it. `None` for a start within the limits.
+pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Option<Prefix> {
+    let [velocity, acceleration] = joint.start;
+    // Whatever a start does that is within the limits and can stay there, nothing is to do.
+    let rising = joint.fall * acceleration.max(0.0).powi(2) / 2.0;
+    let falling = joint.rise * acceleration.min(0.0).powi(2) / 2.0;
+    let contained = acceleration <= joint.top && acceleration >= -joint.bottom;
+    if contained && velocity + rising <= joint.peak && velocity - falling >= velocity_min {
+        return None;
+    }
     let mut prefix = Prefix::none(joint);
     if joint.rise + joint.fall == 0.0 {
         let (limit, braking) = if velocity > joint.peak {
@@ -51,36 +55,41 @@ pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Prefix {
         } else if velocity < velocity_min {
             (velocity_min, joint.top)
         } else {
-            return prefix;
+            return None;
         };
         prefix.steps[0] = Phase { duration: (limit - velocity) / braking, velocity, acceleration: braking, slope: 0 };
         prefix.end = [limit, 0.0];
-        return prefix;
+        return Some(prefix);
     }
     prefix.contain(joint);
     let below = joint.mirrored(-velocity_min);
-    if soft && (prefix.settle(joint, 1.0) || prefix.settle(&below, -1.0)) {
-        return prefix;
-    }
-    if !prefix.lower(joint, velocity_min, 1.0) {
+    if !(soft && (prefix.settle(joint, 1.0) || prefix.settle(&below, -1.0)))
+        && !prefix.lower(joint, velocity_min, 1.0)
+    {
         prefix.lower(&below, -joint.peak, -1.0);
     }
-    prefix
+    prefix.used()
 }
 
 /// The prefix of a joint whose velocity is not limited.
-pub(crate) fn acceleration_prefix(joint: &Joint) -> Prefix {
-    let mut prefix = Prefix::none(joint);
-    if joint.rise + joint.fall > 0.0 {
-        prefix.contain(joint);
+pub(crate) fn acceleration_prefix(joint: &Joint) -> Option<Prefix> {
+    let acceleration = joint.start[1];
+    if joint.rise + joint.fall == 0.0 || (acceleration <= joint.top && acceleration >= -joint.bottom) {
+        return None;
     }
-    prefix
+    let mut prefix = Prefix::none(joint);
+    prefix.contain(joint);
+    prefix.used()
 }
 
 impl Prefix {
-    /// No prefix.
-    pub(crate) fn none(joint: &Joint) -> Self {
+    fn none(joint: &Joint) -> Self {
         Prefix { steps: [Phase::default(); STEPS_MAX], end: joint.start }
+    }
+
+    /// Itself if it takes time.
+    fn used(self) -> Option<Self> {
+        (self.steps[0].duration > 0.0).then_some(self)
     }
 
     /// Brings the acceleration into its band.

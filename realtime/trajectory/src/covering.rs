@@ -3,7 +3,7 @@
 //! See [`crate::extremal`] for the shape of the curve P(T) and the slope whose zeros cut it.
 
 use crate::{
-    extremal::{Extremal, Joint},
+    extremal::{Extremal, Joint, Shape},
     root::root_between,
     sqrt::sqrt,
 };
@@ -32,17 +32,27 @@ impl Tie {
 }
 
 impl Extremal {
-    /// The first duration in `[from, to]` at which `distance` is covered, when less is covered at
-    /// `from`.
-    pub(crate) fn first_covering(&self, distance: f64, tie: Tie, from: f64, to: f64) -> Option<f64> {
+    /// The first duration in `[from, to]` at which `distance` is covered, when at `from` the motion is
+    /// `shape` and covers less, `before`.
+    pub(crate) fn first_covering(
+        &self,
+        distance: f64,
+        tie: Tie,
+        from: f64,
+        to: f64,
+        mut shape: Shape,
+        mut before: f64,
+    ) -> Option<f64> {
         let exact = |time: f64| {
             let shape = self.shape(time);
             let off = self.distance(&shape) - distance;
             let known = off.abs() <= self.tolerance(time, &shape) / 16.0;
-            (if known { 0.0 } else { off }, self.slope(&shape))
+            [if known { 0.0 } else { off }, self.slope(&shape), self.bend(&shape)]
         };
-        let (mut begin, mut before) = (from, self.distance_in(from));
-        let convex = self.convex_from();
+        let mut begin = from;
+        // The fall reaching from positive to negative accelerations, P(T) is convex from here on.
+        let straddles = shape.high >= 0.0 && shape.low <= 0.0;
+        let convex = if straddles { from } else { self.convex_from() };
         if from < convex {
             let end = to.min(convex);
             let mut marks = Marks::between(from, end);
@@ -59,17 +69,17 @@ impl Extremal {
                 }
                 (begin, before) = (mark, covered);
             }
+            shape = self.shape(begin);
         }
         let end = to.min(self.peak_time);
         if begin < end {
-            if before >= distance - tie.loose && self.slope(&self.shape(begin)) < 0.0 {
+            let slope = self.slope(&shape);
+            if before >= distance - tie.loose && slope < 0.0 {
                 return Some(begin);
             }
             let covered = self.distance_in(end);
             if covered > distance {
-                // About the second power of the time is covered.
-                let share = sqrt(((distance - before) / (covered - before)).clamp(0.0, 1.0));
-                return Some(root_between(exact, begin, end, begin + (end - begin) * share));
+                return Some(root_between(exact, begin, end, begin + parabola(slope, end - begin, covered - before, distance - before)));
             }
             if covered >= distance - tie.tight {
                 return Some(end);
@@ -142,6 +152,14 @@ impl Extremal {
             }
         }
     }
+}
+
+/// Where the parabola that starts with `slope` and has risen by `rise` after `width` has risen by `part`.
+fn parabola(slope: f64, width: f64, rise: f64, part: f64) -> f64 {
+    let bend = (rise - slope * width) / (width * width);
+    let root = sqrt((slope * slope + 4.0 * bend * part).max(0.0));
+    let place = if slope > 0.0 { 2.0 * part / (slope + root) } else { (root - slope) / (2.0 * bend) };
+    if place > 0.0 && place < width { place } else { width / 2.0 }
 }
 
 /// Real roots of `a z^2 + 2 b z + c` with `a > 0`, without cancellation; empty is NaN.

@@ -20,10 +20,7 @@ impl<const N: usize> Cursor<N> {
     /// beginning.
     #[inline]
     pub fn at(&mut self, trajectory: &Trajectory<N>, time: f64) -> [State; N] {
-        let mut states = [State::default(); N];
-        for ((state, profile), segment) in states.iter_mut().zip(trajectory.profiles()).zip(&mut self.segments) {
-            *state = profile.at_from(time, segment);
-        }
-        states
+        let profiles = trajectory.profiles();
+        core::array::from_fn(|joint| profiles[joint].at_from(time, &mut self.segments[joint]))
     }
 }

@@ -90,7 +90,7 @@ impl Profile {
                     let sign = if high >= low { 1.0 } else { -1.0 };
                     let value = |time: f64| {
                         let state = segment.start.advanced(time, segment.jerk);
-                        (sign * (state.position - position), sign * state.velocity)
+                        [state.position - position, state.velocity, state.acceleration].map(|value| sign * value)
                     };
                     let time = if high == 0.0 { to } else { root_between(value, from, to, from + (to - from) / 2.0) };
                     return Some(segment.start_time + time);

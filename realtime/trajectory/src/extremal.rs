@@ -33,16 +33,18 @@
 //! dP/dT = w - beta x y / 2     before the cruise,      dP/dT = V     with it
 //! ```
 //!
+//! and its second derivative follows from those of `w` and `x y` in each case ([`Extremal::bend`]).
+//!
 //! Once the fall reaches from a positive `x` to a negative `y`, this only grows, up to the cruise: the
 //! curve P(T) is convex, and a distance not yet covered is first covered at one place, found by
 //! Newton's iteration. Before that, where both have the same sign, the zeros of the slope, which are
 //! roots of quadratics in each case, and the changes of case cut the curve into at most 16 pieces, on
 //! each of which it is monotone and given by one formula.
 
-use crate::sqrt::sqrt;
+use crate::{motion::Phases, sqrt::sqrt};
 
 /// One joint's velocity problem and limits, seen in one direction.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Joint {
     /// Velocity and acceleration at the start.
     pub(crate) start: [f64; 2],
@@ -90,16 +92,6 @@ pub(crate) struct Shape {
     pub(crate) cruise: f64,
     /// Time waited at `low`.
     pub(crate) hold_low: f64,
-}
-
-/// A part of a motion with constant jerk: its state at the start, without the position.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Phase {
-    pub(crate) duration: f64,
-    pub(crate) velocity: f64,
-    pub(crate) acceleration: f64,
-    /// +1 rising, 0 constant, -1 falling.
-    pub(crate) slope: i8,
 }
 
 /// The farthest motions of one joint, one for each duration.
@@ -245,6 +237,25 @@ impl Extremal {
         }
     }
 
+    /// d²P/dT²: the derivatives of `w` and of `x y` in each case.
+    pub(crate) fn bend(&self, shape: &Shape) -> f64 {
+        let Joint { top, bottom, fall, .. } = self.joint;
+        let (x, y) = (shape.high, shape.low);
+        if shape.cruise > 0.0 || self.mean == 0.0 {
+            return 0.0;
+        }
+        let ratio = fall / (4.0 * self.mean);
+        match (shape.hold_high > 0.0, shape.hold_low > 0.0) {
+            (true, true) => top * bottom / (top + bottom),
+            (true, false) => x * (ratio * x - y) / (x - y),
+            (false, true) => -y * (x - ratio * y) / (x - y),
+            (false, false) => {
+                let (s, square) = (x - y, (x + y) * (x + y) / (x - y));
+                (s - square) / 4.0 + ratio * (s + square) / 2.0
+            }
+        }
+    }
+
     /// How exactly the distance covered by a shape of duration `time` is known.
     pub(crate) fn tolerance(&self, time: f64, shape: &Shape) -> f64 {
         ROUNDING * time * (self.k_start.abs() + self.k_end.abs() + shape.crest.abs())
@@ -256,39 +267,29 @@ impl Extremal {
         (self.distance(&shape), self.tolerance(time, &shape))
     }
 
-    /// The constant-jerk parts of a shape, in order; some may have no duration.
-    pub(crate) fn phases(&self, shape: &Shape) -> [Phase; 7] {
+    /// The constant-jerk parts of a shape, in order, with their signs turned by `sign`.
+    #[inline(always)]
+    pub(crate) fn phases(&self, shape: &Shape, sign: f64) -> Phases {
         let Joint { start: [v0, a0], end: [_, af], rise, fall, .. } = self.joint;
         let Shape { high: x, low: y, crest, hold_high, cruise, hold_low } = *shape;
-        let phase = |duration: f64, velocity: f64, acceleration: f64, slope: i8| Phase {
-            duration,
-            velocity,
-            acceleration,
-            slope,
-        };
+        let mut phases = Phases::new();
         if self.mean == 0.0 {
-            let none = Phase::default();
-            let v = self.k_start;
-            return [
-                none,
-                phase(hold_high, v, x, 0),
-                none,
-                phase(cruise, crest, 0.0, 0),
-                none,
-                phase(hold_low, crest, y, 0),
-                none,
-            ];
+            phases.push(sign, hold_high, self.k_start, x, 0);
+            phases.push(sign, cruise, crest, 0.0, 0);
+            phases.push(sign, hold_low, crest, y, 0);
+            return phases;
         }
-        let (down, over) = if cruise > 0.0 { (x, -y) } else { (x - y, 0.0) };
-        [
-            phase(rise * (x - a0), v0, a0, 1),
-            phase(hold_high, self.k_start + rise * x * x / 2.0, x, 0),
-            phase(fall * down, crest - fall * x * x / 2.0, x, -1),
-            phase(cruise, crest, 0.0, 0),
-            phase(fall * over, crest, 0.0, -1),
-            phase(hold_low, crest - fall * y * y / 2.0, y, 0),
-            phase(rise * (af - y), self.k_end + rise * y * y / 2.0, y, 1),
-        ]
+        phases.push(sign, rise * (x - a0), v0, a0, 1);
+        phases.push(sign, hold_high, self.k_start + rise * x * x / 2.0, x, 0);
+        let down = if cruise > 0.0 { x } else { x - y };
+        phases.push(sign, fall * down, crest - fall * x * x / 2.0, x, -1);
+        if cruise > 0.0 {
+            phases.push(sign, cruise, crest, 0.0, 0);
+            phases.push(sign, fall * -y, crest, 0.0, -1);
+        }
+        phases.push(sign, hold_low, crest - fall * y * y / 2.0, y, 0);
+        phases.push(sign, rise * (af - y), self.k_end + rise * y * y / 2.0, y, 1);
+        phases
     }
 }
 

@@ -118,6 +118,7 @@ impl<const N: usize> Input<N> {
 }
 
 /// The limits of one joint as the solver wants them, after a check.
+#[inline(always)]
 pub(crate) fn check(index: usize, input: &JointInput) -> Result<Joint, Error> {
     let JointInput { interface, start, target, limits, .. } = input;
     let interface = *interface;

@@ -74,6 +74,7 @@ mod extremal;
 mod generator;
 mod input;
 mod instant;
+mod motion;
 mod profile;
 mod reach;
 mod root;
@@ -84,6 +85,7 @@ mod straight;
 mod swing;
 mod task;
 mod trajectory;
+mod writer;
 
 pub use cursor::Cursor;
 pub use error::Error;

@@ -14,7 +14,8 @@
 
 use crate::{
     covering::Tie,
-    extremal::{Extremal, Joint, Phase, Shape},
+    extremal::{Extremal, Joint, Shape},
+    motion::Phases,
     swing::{ARRIVAL_SHARE, Durations, Swing},
 };
 
@@ -31,8 +32,10 @@ const ROUNDINGS: f64 = 64.0;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach {
     far: Extremal,
-    /// Every sign turned, so that it, too, is a farthest motion.
-    near: Extremal,
+    /// Every sign turned, so that it, too, is a farthest motion; made when first needed.
+    near: Option<Extremal>,
+    /// Lowest velocity.
+    velocity_min: f64,
     durations: Durations,
     distance: f64,
     /// Rounding of the distance itself.
@@ -42,23 +45,28 @@ pub(crate) struct Reach {
     /// How long the rest takes if one jerk does it up to roundings, else negative. A motion recomputed
     /// every cycle from its own output ends like that, with nothing left to correct its roundings.
     arrival: f64,
+    /// The motion of the duration last found.
+    found: Mixture,
 }
 
 /// A motion of given duration as a mixture of the two extremal ones.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Mixture {
-    pub(crate) far: Shape,
-    pub(crate) near: Shape,
+    /// The duration; NaN for no motion.
+    time: f64,
+    far: Shape,
+    near: Shape,
     /// Weight of `far`, 0 to 1.
-    pub(crate) share: f64,
+    share: f64,
 }
 
 impl Reach {
-    /// `distance` is known to within `rounding`, and `allowed` off it is near enough; `velocity_min` is the lowest velocity of the joint.
+    /// `distance` is known to within `rounding`, and `allowed` off it is near enough; `velocity_min` is
+    /// the lowest velocity of the joint.
+    #[inline(always)]
     pub(crate) fn new(joint: Joint, velocity_min: f64, distance: f64, rounding: f64, allowed: f64) -> Self {
         let velocities = joint.start[0].abs() + joint.end[0].abs();
-        let near = joint.mirrored(-velocity_min);
-        let (far, near) = (Extremal::new(joint), Extremal::new(near));
+        let far = Extremal::new(joint);
         let swing = Swing::of(&joint);
         let arrival = swing.straight(velocities, joint.peak.max(-velocity_min)).filter(|time| {
             let off = distance - swing.straight_distance(*time, joint.start[0]);
@@ -71,12 +79,23 @@ impl Reach {
         });
         let durations = swing.durations(velocities);
         let arrival = arrival.unwrap_or(-1.0);
-        Reach { far, near, durations, distance, rounding, allowed, arrival }
+        let found = Mixture { time: f64::NAN, far: far.peak_shape, near: far.peak_shape, share: 1.0 };
+        Reach { far, near: None, velocity_min, durations, distance, rounding, allowed, arrival, found }
     }
 
-    /// How long the rest takes, if one jerk does it up to roundings.
-    pub(crate) fn arrival(&self) -> Option<f64> {
-        (self.arrival >= 0.0).then_some(self.arrival)
+    pub(crate) fn joint(&self) -> &Joint {
+        &self.far.joint
+    }
+
+    /// The nearest motions.
+    fn near(&mut self) -> &Extremal {
+        let (joint, velocity_max) = (&self.far.joint, -self.velocity_min);
+        self.near.get_or_insert_with(|| Extremal::new(joint.mirrored(velocity_max)))
+    }
+
+    /// How long the rest takes, if one jerk does it up to roundings; else negative.
+    pub(crate) fn arrival(&self) -> f64 {
+        self.arrival
     }
 
     /// Whether one jerk does the rest in no less than `time`.
@@ -85,7 +104,7 @@ impl Reach {
     }
 
     /// The first possible duration not below `time`, or `None` if the target is never reached.
-    pub(crate) fn next(&self, time: f64) -> Option<f64> {
+    pub(crate) fn next(&mut self, time: f64) -> Option<f64> {
         if self.arrives_by(time) {
             return Some(time.max(self.arrival));
         }
@@ -103,45 +122,65 @@ impl Reach {
     ///
     /// If the distance lies above the interval at `from`, it enters it by crossing the upper end, and
     /// the lower end is no obstacle there, being lower; and the other way round.
-    fn next_before(&self, from: f64, to: f64) -> Option<f64> {
-        let (high, known) = self.far.distance_known(from);
-        let tie = Tie::new(self.rounding + known, self.allowed);
-        if self.distance > high + tie.tight {
-            return self.far.first_covering(self.distance, tie, from, to);
+    fn next_before(&mut self, from: f64, to: f64) -> Option<f64> {
+        let (distance, rounding, allowed) = (self.distance, self.rounding, self.allowed);
+        let far = self.far.shape(from);
+        let high = self.far.distance(&far);
+        let tie = Tie::new(rounding + self.far.tolerance(from, &far), allowed);
+        if distance > high + tie.tight {
+            let time = self.far.first_covering(distance, tie, from, to, far, high)?;
+            let far = self.far.shape(time);
+            self.found = Mixture { time, far, near: far, share: 1.0 };
+            return Some(time);
         }
-        let (low, known) = self.near.distance_known(from);
-        let tie = Tie::new(self.rounding + known, self.allowed);
-        if -self.distance > low + tie.tight {
-            return self.near.first_covering(-self.distance, tie, from, to);
+        let extremal = self.near();
+        let near = extremal.shape(from);
+        let low = -extremal.distance(&near);
+        let tie = Tie::new(rounding + extremal.tolerance(from, &near), allowed);
+        if distance < low - tie.tight {
+            let time = extremal.first_covering(-distance, tie, from, to, near, -low)?;
+            let near = extremal.shape(time);
+            self.found = Mixture { time, far, near, share: 0.0 };
+            return Some(time);
         }
+        self.found = Mixture { time: from, far, near, share: self.share(low, high) };
         Some(from)
     }
 
     /// The motion that takes `time`, which must be a possible duration.
-    pub(crate) fn mixture(&self, time: f64) -> Mixture {
+    fn mixture(&mut self, time: f64) -> Mixture {
+        if self.found.time == time {
+            return self.found;
+        }
         let far = self.far.shape(time);
         let high = self.far.distance(&far);
         if self.distance >= high {
-            return Mixture { far, near: far, share: 1.0 };
+            return Mixture { time, far, near: far, share: 1.0 };
         }
-        let near = self.near.shape(time);
-        let low = -self.near.distance(&near);
-        let share = if high <= low {
+        let extremal = self.near();
+        let near = extremal.shape(time);
+        let low = -extremal.distance(&near);
+        Mixture { time, far, near, share: self.share(low, high) }
+    }
+
+    /// The weight with which the distance lies between `low` and `high`.
+    fn share(&self, low: f64, high: f64) -> f64 {
+        if self.distance >= high || high <= low {
             1.0
         } else if self.distance <= low {
             0.0
         } else {
             (self.distance - low) / (high - low)
-        };
-        Mixture { far, near, share }
+        }
     }
-}
 
-impl Mixture {
-    /// The phases of the two motions, the nearest one with its signs turned, and the share of the first.
-    pub(crate) fn phases(&self, reach: &Reach) -> ([Phase; 7], [Phase; 7], f64) {
-        let far = reach.far.phases(&self.far);
-        let near = if self.share >= 1.0 { far } else { reach.near.phases(&self.near) };
-        (far, near, self.share)
+    /// The farthest motion of duration `time` and the nearest, each if it has a part in the one wanted, and
+    /// the weight of the first.
+    #[inline(always)]
+    pub(crate) fn motions(&mut self, time: f64) -> (Option<Phases>, Option<Phases>, f64) {
+        let Mixture { far, near, share, .. } = self.mixture(time);
+        let far = (share > 0.0).then(|| self.far.phases(&far, 1.0));
+        let near = (share < 1.0).then(|| self.near().phases(&near, -1.0));
+        (far, near, share)
     }
 }

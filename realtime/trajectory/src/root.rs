@@ -1,18 +1,21 @@
 //! A root of a monotone function.
 
-/// Halvings that bring any bracket of doubles to neighbours, plus the Newton steps between them.
+/// Halvings that bring any bracket of doubles to neighbours, plus the steps between them.
 const STEPS_MAX: usize = 2200;
 
-/// The root of a function with `f(low) < 0 < f(high)` and no other one, given with its slope and a
-/// first guess.
+/// A last step this small, relatively, whose square is below rounding, needs no look at where it led.
+const LAST_STEP: f64 = 7e-9;
+
+/// The root of a function with `f(low) < 0 < f(high)` and no other one, given with its first two
+/// derivatives and a first guess.
 ///
-/// Newton's step when it stays inside the bracket and the bracket keeps shrinking, else the middle.
-/// Every second step at most is wasted, so the loop ends within `STEPS_MAX`; three to eight steps
-/// are usual.
-pub(crate) fn root_between(function: impl Fn(f64) -> (f64, f64), mut low: f64, mut high: f64, mut guess: f64) -> f64 {
+/// Halley's step when it stays inside the bracket and the bracket keeps shrinking, else the middle.
+/// Every second step at most is wasted, so the loop ends within `STEPS_MAX`; two to four steps are
+/// usual.
+pub(crate) fn root_between(function: impl Fn(f64) -> [f64; 3], mut low: f64, mut high: f64, mut guess: f64) -> f64 {
     let mut last_step = high - low;
     for _ in 0..STEPS_MAX {
-        let (value, slope) = function(guess);
+        let [value, slope, bend] = function(guess);
         if value == 0.0 {
             return guess;
         }
@@ -21,21 +24,27 @@ pub(crate) fn root_between(function: impl Fn(f64) -> (f64, f64), mut low: f64, m
         } else {
             high = guess;
         }
-        let newton = guess - value / slope;
-        let step = (newton - guess).abs();
-        let next = if newton > low && newton < high && 2.0 * step <= last_step {
+        let newton = value / slope;
+        let turn = newton * bend / slope;
+        let halley = newton / (1.0 - (turn / 2.0).clamp(-1.0, 0.5));
+        let step = halley.abs();
+        let next = guess - halley;
+        if next > low && next < high && 2.0 * step <= last_step {
+            if step <= LAST_STEP * guess.abs() && turn.abs() <= LAST_STEP {
+                return next;
+            }
             last_step = step;
-            newton
+            guess = next;
         } else if step <= f64::EPSILON * guess.abs() {
             return guess;
         } else {
             last_step = high - low;
-            low + (high - low) / 2.0
-        };
-        if next == guess || next <= low || next >= high {
-            return guess;
+            let middle = low + (high - low) / 2.0;
+            if middle <= low || middle >= high {
+                return guess;
+            }
+            guess = middle;
         }
-        guess = next;
     }
     guess
 }

@@ -15,6 +15,9 @@ pub struct State {
     pub acceleration: f64,
 }
 
+/// A multiplication takes a fraction of the time of a division.
+const SIXTH: f64 = 1.0 / 6.0;
+
 impl State {
     /// A joint standing still at `position`.
     #[must_use]
@@ -32,7 +35,7 @@ impl State {
     pub fn advanced(&self, time: f64, jerk: f64) -> Self {
         let State { position, velocity, acceleration } = *self;
         State {
-            position: position + time * (velocity + time * (acceleration / 2.0 + time * jerk / 6.0)),
+            position: position + time * (velocity + time * (acceleration / 2.0 + time * jerk * SIXTH)),
             velocity: velocity + time * (acceleration + time * jerk / 2.0),
             acceleration: acceleration + time * jerk,
         }

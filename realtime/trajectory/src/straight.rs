@@ -8,7 +8,7 @@
 
 use crate::{
     error::Error,
-    input::{Input, Interface, JointInput},
+    input::{self, Input, Interface, JointInput},
     profile::Profile,
     state::{Limits, State},
     task::Task,
@@ -21,6 +21,8 @@ const TIE: f64 = 64.0 * f64::EPSILON;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line<const N: usize> {
     pub(crate) task: Task,
+    /// The problem of the line coordinate.
+    coordinate: JointInput,
     /// The joint whose coordinate is that of the line.
     pub(crate) leader: usize,
     /// Share of each joint in the line coordinate; 0 for a joint that does not move.
@@ -31,7 +33,7 @@ impl<const N: usize> Line<N> {
     /// The line of the joints marked in `members`.
     ///
     /// # Errors
-    /// [`Error::NotStraight`] if there is none, or what [`Task::new`] finds wrong.
+    /// [`Error::NotStraight`] if there is none, or what [`input::check`] finds wrong.
     pub(crate) fn new(input: &Input<N>, members: &[bool; N]) -> Result<Self, Error> {
         let quantities: [[f64; N]; 5] = [
             core::array::from_fn(|i| match input.interface[i] {
@@ -85,17 +87,21 @@ impl<const N: usize> Line<N> {
         let own = input.joint(leader);
         let start = State { position: 0.0, ..own.start };
         let target = State { position: quantities[0][leader], ..own.target };
-        let task = Task::new(leader, &JointInput { start, target, limits, ..own })?;
-        Ok(Line { task, leader, direction })
+        let coordinate = JointInput { start, target, limits, ..own };
+        let joint = input::check(leader, &coordinate)?;
+        Ok(Line { task: Task::new(joint, &coordinate), coordinate, leader, direction })
     }
 
-    /// The motion of joint `index`, given that of the line coordinate, unless it leaves the range of
-    /// doubles.
-    pub(crate) fn profile(&self, index: usize, line: &Profile, input: &Input<N>, minimum: f64) -> Option<Profile> {
+    /// The motion of the line coordinate, unless it leaves the range of doubles.
+    pub(crate) fn along(&mut self, duration: f64) -> Option<Profile> {
+        let mut profile = Profile::EMPTY;
+        self.task.write(&self.coordinate, duration, &mut profile).then_some(profile)
+    }
+
+    /// The motion of joint `index`, given that of the line coordinate.
+    pub(crate) fn profile(&self, index: usize, along: &Profile, input: &Input<N>) -> Profile {
         let held = input.interface[index] == Interface::Position;
-        let start = input.start[index].position;
-        let profile = line.scaled(self.direction[index], start, &input.target[index], held, minimum);
-        profile.extent(0.0, 0.0).is_finite().then_some(profile)
+        along.scaled(self.direction[index], input.start[index].position, &input.target[index], held)
     }
 }
 

@@ -19,10 +19,7 @@
 //! It is there when both accelerations are positive: a short transition gains little, a long one
 //! must first get rid of the acceleration.
 
-use crate::{
-    extremal::{Joint, Phase},
-    sqrt::sqrt,
-};
+use crate::{extremal::Joint, motion::Phase, sqrt::sqrt};
 
 /// Relative width within which a gain counts as the gain of the tip: some roundings of the inputs.
 const TIE: f64 = 8.0 * f64::EPSILON;
@@ -85,6 +82,12 @@ impl Swing {
         Swing { start: a0, end: af, gain: vf - v0, top, bottom, rise, fall }
     }
 
+    /// The joint whose velocity problem this is, from another start; its velocity is not limited.
+    pub(crate) fn joint(&self, start: [f64; 2]) -> Joint {
+        let Swing { end, gain, top, bottom, rise, fall, .. } = *self;
+        Joint { start, end: [start[0] + gain, end], peak: f64::INFINITY, top, bottom, rise, fall }
+    }
+
     /// The possible durations of this swing. `velocity_scale` is the size of the velocities whose
     /// difference `gain` is, for the width of a tie.
     pub(crate) fn durations(&self, velocity_scale: f64) -> Durations {
@@ -141,26 +144,46 @@ impl Swing {
         }
     }
 
-    /// The motion that gains most velocity in `time`, and that gain.
-    pub(crate) fn highest(&self, time: f64, velocity: f64) -> ([Phase; 7], f64) {
-        let Swing { start, end, top, rise, fall, .. } = *self;
-        let mut phases = [Phase::default(); 7];
-        if rise + fall == 0.0 {
-            phases[0] = Phase { duration: time, velocity, acceleration: top, slope: 0 };
-            return (phases, top * time);
-        }
-        let free = (time + rise * start + fall * end) / (rise + fall);
-        let (turn, hold) = if free > top { (top, (free - top) * (rise + fall)) } else { (free, 0.0) };
-        let climb = rise * (turn - start) * (turn + start) / 2.0;
-        phases[0] = Phase { duration: rise * (turn - start), velocity, acceleration: start, slope: 1 };
-        phases[1] = Phase { duration: hold, velocity: velocity + climb, acceleration: turn, slope: 0 };
-        phases[2] = Phase {
-            duration: fall * (turn - end),
-            velocity: velocity + climb + hold * turn,
-            acceleration: turn,
-            slope: -1,
+    /// The motion that makes the gain in `time`, which must be possible: up or down to some acceleration
+    /// `p`, a wait there, and on to the last. Its gain rises with `p`, and between the two extremal motions
+    /// there is always time for its ramps, as they take least where the extremes take no more than `time`.
+    ///
+    /// ```text
+    /// p above both:  gain = p (T + alpha a0 + beta af) - (alpha a0^2 + beta af^2 + (alpha + beta) p^2) / 2
+    /// p below both:  the same in reverse
+    /// p between:     gain = tip + p (T - ramp), one ramp straight from a0 to af
+    /// ```
+    #[inline(always)]
+    pub(crate) fn waiting(&self, time: f64, velocity: f64) -> [Phase; 3] {
+        let Swing { start, end, gain, top, bottom, rise, fall } = *self;
+        let (tip_time, tip_gain) = self.tip();
+        let rest = (time - tip_time).max(0.0);
+        let (high, low) = (start.max(end), start.min(end));
+        let plateau = if rise + fall == 0.0 {
+            if time > 0.0 { (gain / time).clamp(-bottom, top) } else { 0.0 }
+        } else if gain > tip_gain + high * rest {
+            above(high, gain - tip_gain - high * rest, rest, (rise + fall) / 2.0).min(top)
+        } else if gain < tip_gain + low * rest {
+            -above(-low, tip_gain + low * rest - gain, rest, (rise + fall) / 2.0).min(bottom)
+        } else if rest > 0.0 {
+            ((gain - tip_gain) / rest).clamp(low, high)
+        } else {
+            start
         };
-        (phases, climb + hold * turn + fall * (turn - end) * (turn + end) / 2.0)
+        let ramp = |from: f64, to: f64| {
+            if to >= from { (rise * (to - from), rise, 1) } else { (fall * (from - to), -fall, -1) }
+        };
+        let (first, change, slope) = ramp(start, plateau);
+        let (last, _, slope_last) = ramp(plateau, end);
+        let wait = (time - first - last).max(0.0);
+        let turned = velocity + change * (plateau - start) * (plateau + start) / 2.0;
+        let phase =
+            |duration, velocity, acceleration, slope| Phase { duration, velocity, acceleration, slope };
+        [
+            phase(first, velocity, start, slope),
+            phase(wait, turned, plateau, 0),
+            phase(last, turned + wait * plateau, plateau, slope_last),
+        ]
     }
 
     /// The same swing with every sign turned.
@@ -200,4 +223,11 @@ impl Swing {
         };
         (middle - (rise + fall) * turn, gap_end)
     }
+}
+
+/// The acceleration `p` above `high` at which a motion gains `more` than if it waited at `high` for `rest`,
+/// of which the further ramps take `2 m (p - high)`:  `(p - high) rest - m (p - high)^2 = more`.
+fn above(high: f64, more: f64, rest: f64, mean: f64) -> f64 {
+    let root = sqrt((rest * rest - 4.0 * mean * more).max(0.0));
+    high + (2.0 * more / (rest + root)).min(rest / (2.0 * mean))
 }

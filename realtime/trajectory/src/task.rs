@@ -2,13 +2,13 @@
 
 use crate::{
     brake,
-    error::Error,
     extremal::Joint,
-    input::{self, Interface, JointInput},
+    input::{Interface, JointInput},
     profile::Profile,
     reach::Reach,
     state::State,
     swing::{Durations, Swing},
+    writer::Writer,
 };
 
 /// How exactly a difference of two positions is known, in units of the positions.
@@ -25,15 +25,11 @@ const DIRECT_TIE: f64 = 8.0 * f64::EPSILON;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Task {
     goal: Goal,
-    /// The motion without a prefix, and its duration, if that is just one jerk: on the way to a target
-    /// about to leave the limits, the start is about to, too.
-    direct: Option<(Reach, f64)>,
-    brake: brake::Prefix,
-    input: JointInput,
-    /// Duration of the prefix.
+    /// How long the prefix takes that brings the start inside the limits; 0 if it lies there.
     begin: f64,
-    /// First possible duration of the whole, prefix included.
-    pub(crate) minimum: f64,
+    /// Duration of the motion without a prefix, if that is just one jerk, else negative: on the way to a
+    /// target about to leave the limits, the start is about to, too.
+    direct: f64,
 }
 
 // Boxing the larger variant would allocate in a cycle.
@@ -45,84 +41,110 @@ enum Goal {
 }
 
 impl Task {
-    pub(crate) fn new(index: usize, input: &JointInput) -> Result<Self, Error> {
-        let joint = input::check(index, input)?;
-        let JointInput { interface, start, target, limits, tolerance, .. } = input;
-        let rounding = POSITION_TIE * (start.position.abs() + target.position.abs());
-        let reach = |joint: Joint, position: f64| {
-            Reach::new(joint, limits.velocity_min, target.position - position, rounding, *tolerance)
-        };
-        let brake = match interface {
-            Interface::Position => brake::prefix(&joint, limits.velocity_min, input.soft),
-            Interface::Velocity => brake::acceleration_prefix(&joint),
-        };
-        let mut direct = None;
-        if *interface == Interface::Position && brake.steps[0].duration > 0.0 {
-            let reach = reach(joint, start.position);
-            direct = reach.arrival().map(|duration| (reach, duration));
+    /// The way of a checked `joint`.
+    #[inline(always)]
+    pub(crate) fn new(mut joint: Joint, input: &JointInput) -> Self {
+        let (mut begin, mut position, mut direct) = (0.0, input.start.position, -1.0);
+        if let Some(prefix) = prefix(&joint, input) {
+            if input.interface == Interface::Position {
+                direct = reach(joint, input, position).arrival();
+            }
+            let mut scratch = Profile::EMPTY;
+            let mut writer = Writer::new(&mut scratch, &input.limits, position, f64::INFINITY);
+            writer.prefix(&prefix.steps);
+            (begin, position) = (writer.now(), writer.position);
+            joint.start = prefix.end;
         }
-        let (begin, position) = Profile::empty(limits).prefix(&brake.steps, start.position);
-        let joint = Joint { start: brake.end, ..joint };
-        let goal = match interface {
-            Interface::Position => Goal::Position(reach(joint, position)),
+        let goal = match input.interface {
+            Interface::Position => Goal::Position(reach(joint, input, position)),
             Interface::Velocity => {
                 let swing = Swing::of(&joint);
                 Goal::Velocity(swing, swing.durations(joint.start[0].abs() + joint.end[0].abs()))
             }
         };
-        let mut task = Task { goal, direct, brake, input: *input, begin, minimum: 0.0 };
-        task.minimum = task.next(0.0).ok_or(Error::Unreachable { joint: index })?;
-        if task.minimum.is_finite() { Ok(task) } else { Err(Error::OutOfRange { joint: index }) }
+        Task { goal, begin, direct }
     }
 
-    /// The first possible duration not below `time`; `time` itself unchanged if it is possible.
-    pub(crate) fn next(&self, time: f64) -> Option<f64> {
-        if let Some((_, duration)) = self.direct(time) {
-            return Some(time.max(*duration));
+    /// The first possible duration not below `time`; `time` itself unchanged if it is possible. `None` if
+    /// there is none.
+    pub(crate) fn next(&mut self, time: f64) -> Option<f64> {
+        if self.goes_direct(time) {
+            return Some(time.max(self.direct));
         }
         let passed = (time - self.begin).max(0.0);
-        let found = match &self.goal {
+        let found = match &mut self.goal {
             Goal::Position(reach) => reach.next(passed)?,
             Goal::Velocity(_, durations) => durations.next(passed),
         };
         Some(if found <= passed { time.max(self.begin) } else { self.begin + found })
     }
 
-    /// The motion without a prefix, if it takes no less than `time`.
-    fn direct(&self, time: f64) -> Option<&(Reach, f64)> {
-        self.direct.as_ref().filter(|(_, duration)| time <= duration * (1.0 + DIRECT_TIE))
+    /// Whether there is a motion without a prefix that takes no less than `time`.
+    fn goes_direct(&self, time: f64) -> bool {
+        time <= self.direct * (1.0 + DIRECT_TIE)
     }
 
-    /// The motion that takes `duration`, which must be possible, or `None` if the numbers left the
-    /// range of doubles on the way.
-    pub(crate) fn profile(&self, duration: f64) -> Option<Profile> {
-        let mut profile = Profile::empty(&self.input.limits);
-        let (mut begin, mut position) = (0.0, self.input.start.position);
-        let direct = self.direct(duration);
-        if direct.is_none() {
-            (begin, position) = profile.prefix(&self.brake.steps, position);
+    /// The problem from the start itself.
+    fn joint(&self, input: &JointInput) -> Joint {
+        let start = [input.start.velocity, input.start.acceleration];
+        match &self.goal {
+            Goal::Position(reach) => Joint { start, ..*reach.joint() },
+            Goal::Velocity(swing, _) => swing.joint(start),
         }
-        let time = duration - begin;
-        let (far, near, share) = match (&self.goal, direct) {
-            (_, Some((reach, _))) | (Goal::Position(reach), None) => reach.mixture(time).phases(reach),
-            (Goal::Velocity(swing, _), None) => {
-                let velocity = self.brake.end[0];
-                let (far, high) = swing.highest(time, velocity);
-                let (near, low) = swing.mirrored().highest(time, -velocity);
-                let share = if high + low > 0.0 { ((swing.gain + low) / (high + low)).clamp(0.0, 1.0) } else { 1.0 };
-                (far, near, share)
+    }
+
+    /// Writes the motion that takes `duration`, which must be possible, to `profile`, which must be new;
+    /// `false` if the numbers left the range of doubles on the way.
+    pub(crate) fn write(&mut self, input: &JointInput, duration: f64, profile: &mut Profile) -> bool {
+        let mut writer = Writer::new(profile, &input.limits, input.start.position, duration);
+        if self.goes_direct(duration) {
+            write_reach(&mut reach(self.joint(input), input, input.start.position), duration, &mut writer);
+        } else {
+            let mut velocity = input.start.velocity;
+            if self.begin > 0.0
+                && let Some(prefix) = prefix(&self.joint(input), input)
+            {
+                velocity = prefix.end[0];
+                writer.prefix(&prefix.steps);
             }
-        };
-        let (end, position) = profile.mix(&far, &near, share, begin, time, position);
+            let time = duration - self.begin;
+            match &mut self.goal {
+                Goal::Position(reach) => write_reach(reach, time, &mut writer),
+                Goal::Velocity(swing, _) => writer.follow(&swing.waiting(time, velocity)),
+            }
+        }
         // The positions are integrated forward, so this tells whether all that led here was sound.
-        let target = match self.goal {
-            Goal::Position(_) => self.input.target,
-            Goal::Velocity(..) => State { position, ..self.input.target },
+        let reached = writer.position;
+        let target = match input.interface {
+            Interface::Position => input.target,
+            Interface::Velocity => State { position: reached, ..input.target },
         };
-        let extent = profile.extent(duration, self.input.start.position.abs() + target.position.abs());
-        let sound = extent.is_finite() && (position - target.position).abs() <= SOUND * extent + self.input.tolerance;
-        profile.finish(end.read_as(duration), target);
-        profile.set_minimum(self.minimum);
-        sound.then_some(profile)
+        let extent = writer.finish(target, input.start.position.abs() + target.position.abs());
+        extent.is_finite() && (reached - target.position).abs() <= SOUND * extent + input.tolerance
+    }
+}
+
+/// What brings a start outside the limits back.
+fn prefix(joint: &Joint, input: &JointInput) -> Option<brake::Prefix> {
+    match input.interface {
+        Interface::Position => brake::prefix(joint, input.limits.velocity_min, input.soft),
+        Interface::Velocity => brake::acceleration_prefix(joint),
+    }
+}
+
+/// The position problem of `joint`, from `position` on.
+#[inline(always)]
+fn reach(joint: Joint, input: &JointInput, position: f64) -> Reach {
+    let rounding = POSITION_TIE * (input.start.position.abs() + input.target.position.abs());
+    let distance = input.target.position - position;
+    Reach::new(joint, input.limits.velocity_min, distance, rounding, input.tolerance)
+}
+
+/// Appends the motion that takes `time`.
+fn write_reach(reach: &mut Reach, time: f64, writer: &mut Writer<'_>) {
+    match reach.motions(time) {
+        (Some(far), Some(near), share) => writer.mix([&far, &near], share),
+        (Some(motion), ..) | (_, Some(motion), _) => writer.follow(motion.as_slice()),
+        (None, None, _) => {}
     }
 }

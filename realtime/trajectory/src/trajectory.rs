@@ -1,13 +1,14 @@
 //! The trajectory of all joints, and how they share a duration.
 //!
 //! Each synchronised joint, or line of joints, has its possible durations ([`crate::reach`]). The
-//! shared one is the first that is possible for all: start with the longest minimum, and while it
-//! lies inside a blocked interval of some joint, move on to the end of that interval. A joint has
-//! at most three blocked intervals, so this ends.
+//! shared one is the first that is possible for all: ask each joint in turn for its first duration not
+//! below the one that those before have agreed on, until all agree. A joint whose first duration is
+//! shorter than that of another is thus only asked whether it can take as long, which needs no search. It
+//! has at most three blocked intervals, so this ends.
 
 use crate::{
     error::Error,
-    input::{Input, Interface, Synchronization},
+    input::{self, Input, Interface, Synchronization},
     profile::Profile,
     state::{Limits, State},
     straight::Line,
@@ -21,6 +22,9 @@ const STRAIGHT_TIE: f64 = 1e-12;
 /// Relative difference of two durations that is rounding.
 const STEP_TIE: f64 = 4.0 * f64::EPSILON;
 
+/// How often a joint by itself is asked at most: it has three blocked intervals.
+const PASSES: usize = 5;
+
 /// A motion of `N` joints.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +34,8 @@ pub struct Trajectory<const N: usize> {
 }
 
 impl<const N: usize> Trajectory<N> {
+    const EMPTY: Self = Trajectory { profiles: [Profile::EMPTY; N], duration: 0.0 };
+
     /// The fastest motion from start to target in which the joints keep their limits and share
     /// their durations as asked.
     ///
@@ -39,8 +45,16 @@ impl<const N: usize> Trajectory<N> {
     /// # Realtime
     /// No allocation; at most `2 + 3 N` passes over the joints, each of bounded work.
     pub fn calculate(input: &Input<N>) -> Result<Self, Error> {
-        let trajectory = Plan::new(input)?.trajectory(input)?;
-        for (index, profile) in trajectory.profiles.iter().enumerate() {
+        let mut trajectory = Self::EMPTY;
+        trajectory.fill(input).map(|()| trajectory)
+    }
+
+    fn fill(&mut self, input: &Input<N>) -> Result<(), Error> {
+        let tasks = core::array::from_fn(|_| None);
+        let mut plan = Plan { tasks, line: None, on_line: [false; N], shared: [false; N], duration: 0.0 };
+        plan.prepare(input)?;
+        plan.write(input, self)?;
+        for (index, profile) in self.profiles.iter().enumerate() {
             let (low, high) = (input.position_min[index], input.position_max[index]);
             if input.enabled[index] && (low > f64::NEG_INFINITY || high < f64::INFINITY) {
                 let extrema = profile.extrema();
@@ -49,7 +63,7 @@ impl<const N: usize> Trajectory<N> {
                 }
             }
         }
-        Ok(trajectory)
+        Ok(())
     }
 
     /// The fastest stop of each joint, whatever the others do. Velocity limits play no part: braking
@@ -82,7 +96,11 @@ impl<const N: usize> Trajectory<N> {
     #[must_use]
     #[inline]
     pub fn at(&self, time: f64) -> [State; N] {
-        core::array::from_fn(|joint| self.profiles[joint].at(time))
+        let mut states = [State::default(); N];
+        for (state, profile) in states.iter_mut().zip(&self.profiles) {
+            *state = profile.at(time);
+        }
+        states
     }
 
     /// The motion of each joint.
@@ -107,129 +125,165 @@ struct Plan<const N: usize> {
 }
 
 impl<const N: usize> Plan<N> {
-    fn new(input: &Input<N>) -> Result<Self, Error> {
-        let mut plan = Plan { tasks: [None; N], line: None, on_line: [false; N], shared: [false; N], duration: 0.0 };
+    /// Finds the shared duration.
+    fn prepare(&mut self, input: &Input<N>) -> Result<(), Error> {
         let (mut phase, mut strict) = (false, false);
         for index in 0..N {
             if !input.enabled[index] {
                 continue;
             }
+            let own = input.joint(index);
+            self.tasks[index] = Some(Task::new(input::check(index, &own)?, &own));
             let target = &input.target[index];
-            plan.tasks[index] = Some(Task::new(index, &input.joint(index))?);
             let rests = target.velocity == 0.0 && target.acceleration == 0.0;
-            plan.shared[index] = match input.synchronization[index] {
+            self.shared[index] = match input.synchronization[index] {
                 Synchronization::None => false,
                 Synchronization::TimeIfNecessary => !rests,
                 Synchronization::Time => true,
                 Synchronization::Phase => {
-                    (phase, plan.on_line[index]) = (true, true);
+                    (phase, self.on_line[index]) = (true, true);
                     true
                 }
                 Synchronization::StrictPhase => {
-                    (strict, plan.on_line[index]) = (true, true);
+                    (strict, self.on_line[index]) = (true, true);
                     true
                 }
             };
         }
         if strict {
-            plan.line = Some(Line::new(input, &plan.on_line)?);
+            self.line = Some(Line::new(input, &self.on_line)?);
         }
-        plan.duration = plan.shared_duration(input)?;
-        if !plan.duration.is_finite() {
-            return Err(Error::OutOfRange { joint: plan.last() });
-        }
+        self.duration = self.shared_duration(input)?;
         if phase && !strict {
             // Worth it only if it takes no longer.
-            if let Ok(line) = Line::new(input, &plan.on_line) {
-                let apart = plan.duration;
-                plan.line = Some(line);
-                match plan.shared_duration(input) {
-                    Ok(straight) if straight <= apart * (1.0 + STRAIGHT_TIE) => plan.duration = straight,
-                    _ => plan.line = None,
+            if let Ok(line) = Line::new(input, &self.on_line) {
+                let apart = self.duration;
+                self.line = Some(line);
+                match self.shared_duration(input) {
+                    Ok(straight) if straight <= apart * (1.0 + STRAIGHT_TIE) => self.duration = straight,
+                    _ => self.line = None,
                 }
             }
         }
-        Ok(plan)
+        Ok(())
     }
 
-    /// The joint with the longest minimum duration.
-    fn last(&self) -> usize {
-        let minimum = |index: usize| self.tasks[index].as_ref().map_or(0.0, |task| task.minimum);
-        (0..N).fold(0, |last, index| if minimum(index) > minimum(last) { index } else { last })
-    }
-
-    /// The tasks that share a duration: the line, and the joints not on it.
-    fn sharing(&self) -> impl Iterator<Item = (usize, &Task)> {
-        let line = self.line.as_ref().map(|line| (0, &line.task));
-        let alone = self.tasks.iter().enumerate().filter_map(|(index, task)| {
-            let apart = self.shared[index] && !(self.line.is_some() && self.on_line[index]);
-            if apart { task.as_ref().map(|task| (index, task)) } else { None }
-        });
-        line.into_iter().chain(alone)
-    }
-
-    fn shared_duration(&self, input: &Input<N>) -> Result<f64, Error> {
-        let first = self.sharing().fold(0.0_f64, |longest, (_, task)| longest.max(task.minimum));
-        if self.sharing().next().is_none() {
-            return Ok(0.0);
-        }
-        let next = |time: f64| {
-            let mut duration = time;
-            for (index, task) in self.sharing() {
-                duration = task.next(duration).ok_or(Error::Unreachable { joint: index })?;
-            }
-            Ok(duration)
+    /// The tasks that share a duration, in `N + 1` places: the line, then the joints not on it.
+    fn sharing(&mut self, place: usize) -> Option<(usize, &mut Task)> {
+        let Some(index) = place.checked_sub(1) else {
+            return self.line.as_mut().map(|line| (line.leader, &mut line.task));
         };
-        possible(first.max(input.minimum_duration), input.duration_step, 2 + 3 * N, next)
+        if self.shared[index] && !(self.line.is_some() && self.on_line[index]) {
+            self.tasks[index].as_mut().map(|task| (index, task))
+        } else {
+            None
+        }
     }
 
-    fn trajectory(&self, input: &Input<N>) -> Result<Trajectory<N>, Error> {
-        let mut trajectory = Trajectory { profiles: [Profile::drifting(State::default()); N], duration: self.duration };
-        let line = match &self.line {
-            Some(line) => {
-                Some((line, line.task.profile(self.duration).ok_or(Error::OutOfRange { joint: line.leader })?))
+    fn shared_duration(&mut self, input: &Input<N>) -> Result<f64, Error> {
+        let (mut duration, step) = (input.minimum_duration.max(0.0), input.duration_step);
+        // How many tasks in a row have found the duration possible.
+        let (mut agreed, mut any) = (0, false);
+        for round in 0..(2 + 3 * N) * (N + 1) {
+            let place = round % (N + 1);
+            if place == 0 && step > 0.0 {
+                let whole = multiple(duration, step);
+                if whole > duration {
+                    (duration, agreed) = (whole, 0);
+                }
             }
+            agreed += 1;
+            if let Some((joint, task)) = self.sharing(place) {
+                any = true;
+                let found = first_possible(task, duration, joint)?;
+                if found > duration * (1.0 + STEP_TIE) {
+                    (duration, agreed) = (found, 1);
+                    if step > 0.0 {
+                        (duration, agreed) = (multiple(found, step), 0);
+                    }
+                }
+            }
+            if agreed > N {
+                break;
+            }
+        }
+        Ok(if any { duration } else { 0.0 })
+    }
+
+    /// Writes the motion of each joint to a trajectory that has none yet.
+    fn write(&mut self, input: &Input<N>, trajectory: &mut Trajectory<N>) -> Result<(), Error> {
+        trajectory.duration = self.duration;
+        let along = match &mut self.line {
+            Some(line) => Some(line.along(self.duration).ok_or(Error::OutOfRange { joint: line.leader })?),
             None => None,
         };
         for (index, profile) in trajectory.profiles.iter_mut().enumerate() {
-            *profile = match (&self.tasks[index], &line) {
-                (None, _) => Profile::drifting(input.start[index]),
-                (Some(task), Some((line, along))) if self.on_line[index] => {
-                    line.profile(index, along, input, task.minimum).ok_or(Error::OutOfRange { joint: index })?
+            let sound = match (&mut self.tasks[index], &self.line, &along) {
+                (None, ..) => {
+                    *profile = Profile::drifting(input.start[index]);
+                    true
                 }
-                (Some(task), _) => {
+                (Some(_), Some(line), Some(along)) if self.on_line[index] => {
+                    *profile = line.profile(index, along, input);
+                    profile.is_finite()
+                }
+                (Some(task), ..) => {
                     let duration = if self.shared[index] { self.duration } else { own_duration(task, input, index)? };
                     trajectory.duration = trajectory.duration.max(duration);
-                    task.profile(duration).ok_or(Error::OutOfRange { joint: index })?
+                    task.write(&input.joint(index), duration, profile)
                 }
             };
+            if !sound {
+                return Err(Error::OutOfRange { joint: index });
+            }
         }
-        Ok(trajectory)
+        Ok(())
     }
+}
+
+/// The first possible duration of `task` not below `time`.
+fn first_possible(task: &mut Task, time: f64, joint: usize) -> Result<f64, Error> {
+    let found = task.next(time).ok_or(Error::Unreachable { joint })?;
+    if found.is_finite() { Ok(found) } else { Err(Error::OutOfRange { joint }) }
 }
 
 /// The first possible duration of a joint that shares none.
-fn own_duration<const N: usize>(task: &Task, input: &Input<N>, index: usize) -> Result<f64, Error> {
-    let next = |time: f64| task.next(time).ok_or(Error::Unreachable { joint: index });
-    possible(task.minimum.max(input.minimum_duration), input.duration_step, 5, next)
-}
-
-/// The first duration not below `time`, a multiple of `step` unless that is 0, that `next` leaves
-/// as it is; `next` moves a duration to the first one some joint can take.
-fn possible(time: f64, step: f64, passes: usize, next: impl Fn(f64) -> Result<f64, Error>) -> Result<f64, Error> {
-    let mut duration = next(time)?;
-    if step <= 0.0 && duration <= time {
-        return Ok(time);
-    }
-    for _ in 0..passes {
-        let candidate = if step > 0.0 { multiple(duration, step) } else { duration };
-        let found = next(candidate)?;
-        if found <= candidate * (1.0 + STEP_TIE) {
-            return Ok(candidate);
+fn own_duration<const N: usize>(task: &mut Task, input: &Input<N>, joint: usize) -> Result<f64, Error> {
+    let (mut duration, step) = (first_possible(task, input.minimum_duration.max(0.0), joint)?, input.duration_step);
+    if step > 0.0 {
+        for _ in 0..PASSES {
+            let whole = multiple(duration, step);
+            duration = first_possible(task, whole, joint)?;
+            if duration <= whole * (1.0 + STEP_TIE) {
+                return Ok(whole);
+            }
         }
-        duration = found;
     }
     Ok(duration)
+}
+
+impl<const N: usize> Input<N> {
+    /// The shortest time in which each joint alone could reach its target, in seconds; 0 for one that is not
+    /// enabled.
+    ///
+    /// # Errors
+    /// As [`Trajectory::calculate`].
+    ///
+    /// # Realtime
+    /// No allocation; at most as long as a calculation.
+    pub fn minimum_durations(&self) -> Result<[f64; N], Error> {
+        let mut durations = [0.0; N];
+        for (index, duration) in durations.iter_mut().enumerate() {
+            if self.enabled[index] {
+                *duration = {
+                    let own = self.joint(index);
+                    let joint = input::check(index, &own)?;
+                    first_possible(&mut Task::new(joint, &own), 0.0, index)?
+                };
+            }
+        }
+        Ok(durations)
+    }
 }
 
 /// The smallest multiple of `step` that is not below `time`, up to rounding.

@@ -32,41 +32,24 @@ impl Source {
 
     fn sometimes(&mut self, probability: f64) -> f64 {
         let value = self.normal(0.8);
-        if self.uniform(0.0, 1.0) < probability {
-            value
-        } else {
-            0.0
-        }
+        if self.uniform(0.0, 1.0) < probability { value } else { 0.0 }
     }
 
     /// A problem whose target can be reached and left within its limits.
     pub fn problem(&mut self) -> Problem {
         loop {
-            let start = State {
-                position: self.normal(4.0),
-                velocity: self.sometimes(0.9),
-                acceleration: self.sometimes(0.8),
-            };
-            let target = State {
-                position: self.normal(4.0),
-                velocity: self.sometimes(0.7),
-                acceleration: self.sometimes(0.6),
-            };
+            let start =
+                State { position: self.normal(4.0), velocity: self.sometimes(0.9), acceleration: self.sometimes(0.8) };
+            let target =
+                State { position: self.normal(4.0), velocity: self.sometimes(0.7), acceleration: self.sometimes(0.6) };
             let (v, a) = (target.velocity, target.acceleration);
-            let (velocity, acceleration, jerk) = (
-                self.uniform(0.1, 12.0) + v.abs(),
-                self.uniform(0.1, 12.0) + a.abs(),
-                self.uniform(0.1, 12.0),
-            );
+            let (velocity, acceleration, jerk) =
+                (self.uniform(0.1, 12.0) + v.abs(), self.uniform(0.1, 12.0) + a.abs(), self.uniform(0.1, 12.0));
             let reach = a * a / (2.0 * jerk);
             if (a < 0.0 && v + reach > velocity) || (a > 0.0 && v - reach < -velocity) {
                 continue;
             }
-            return Problem {
-                start,
-                target,
-                limits: Limits::symmetric(velocity, acceleration, jerk),
-            };
+            return Problem { start, target, limits: Limits::symmetric(velocity, acceleration, jerk) };
         }
     }
 }

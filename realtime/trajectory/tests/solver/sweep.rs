@@ -171,8 +171,11 @@ fn durations_share_the_symmetries_of_the_problem() {
                 continue;
             }
             assert_eq!(duration(&mirrored(&problem)), own, "{kind:?} {index} mirrored: {problem:?}");
-            assert_eq!(duration(&scaled(&problem, 16.0, 1.0)), own, "{kind:?} {index} longer: {problem:?}");
-            assert_eq!(duration(&scaled(&problem, 1.0, 0.125)), own / 8.0, "{kind:?} {index} faster: {problem:?}");
+            // To the bit, but for neighbours of zero, which are too small to scale exactly.
+            let tie = if kind == Kind::Neighbours { 1e-14 * own } else { 0.0 };
+            let same = |problem: Problem, wanted: f64| (duration(&problem) - wanted).abs() <= tie;
+            assert!(same(scaled(&problem, 16.0, 1.0), own), "{kind:?} {index} longer: {problem:?}");
+            assert!(same(scaled(&problem, 1.0, 0.125), own / 8.0), "{kind:?} {index} faster: {problem:?}");
             if kind != Kind::Outside && kind != Kind::Infinite && starts_inside(&problem) {
                 backwards += 1;
                 let other = duration(&reversed(&problem));
