@@ -63,8 +63,7 @@ pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Option<Pre
     }
     prefix.contain(joint);
     let below = joint.mirrored(-velocity_min);
-    if !(soft && (prefix.settle(joint, 1.0) || prefix.settle(&below, -1.0)))
-        && !prefix.lower(joint, velocity_min, 1.0)
+    if !(soft && (prefix.settle(joint, 1.0) || prefix.settle(&below, -1.0))) && !prefix.lower(joint, velocity_min, 1.0)
     {
         prefix.lower(&below, -joint.peak, -1.0);
     }

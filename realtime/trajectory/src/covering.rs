@@ -79,7 +79,12 @@ impl Extremal {
             }
             let covered = self.distance_in(end);
             if covered > distance {
-                return Some(root_between(exact, begin, end, begin + parabola(slope, end - begin, covered - before, distance - before)));
+                return Some(root_between(
+                    exact,
+                    begin,
+                    end,
+                    begin + parabola(slope, end - begin, covered - before, distance - before),
+                ));
             }
             if covered >= distance - tie.tight {
                 return Some(end);

@@ -240,7 +240,7 @@ impl Profile {
 
 /// `time` as a finite one that is not negative, so that it lies in a segment in use; 0 for NaN.
 #[inline]
+#[allow(clippy::manual_clamp, reason = "`clamp` keeps NaN")]
 fn within_range(time: f64) -> f64 {
     time.max(0.0).min(f64::MAX)
 }
-

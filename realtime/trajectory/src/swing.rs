@@ -177,8 +177,7 @@ impl Swing {
         let (last, _, slope_last) = ramp(plateau, end);
         let wait = (time - first - last).max(0.0);
         let turned = velocity + change * (plateau - start) * (plateau + start) / 2.0;
-        let phase =
-            |duration, velocity, acceleration, slope| Phase { duration, velocity, acceleration, slope };
+        let phase = |duration, velocity, acceleration, slope| Phase { duration, velocity, acceleration, slope };
         [
             phase(first, velocity, start, slope),
             phase(wait, turned, plateau, 0),
