@@ -30,11 +30,14 @@ const ACTION: Bound = bound("action_timeout_ms", "ms", 10.0, 600_000.0);
 const LOST: Bound = bound("part_lost_after_ms", "ms", 0.25, 10_000.0);
 const REACTION: Bound = bound("reaction_time_ms", "ms", 0.0, 500.0);
 const HUMAN_SPEED: Bound = bound("human_speed_min_m_s", "m/s", 0.0, 3.0);
+const HUMAN_SPEED_NEAR: Bound = bound("human_speed_near_m_s", "m/s", 0.0, 4.0);
+const NEAR: Bound = bound("near_distance_m", "m", 0.0, 2.0);
 const INTRUSION: Bound = bound("intrusion_m", "m", 0.0, 1.0);
 const SIGMAS: Bound = bound("sigma_factor", "sigma", 0.0, 6.0);
 const UNCERTAINTY: Bound = bound("arm_uncertainty_m", "m", 0.0, 0.1);
 const RESERVE: Bound = bound("reserve_m", "m", 0.0, 0.5);
 const HYSTERESIS: Bound = bound("hysteresis_m", "m", 0.0, 0.5);
+const SPEED_UP: Bound = bound("speed_up_delay_ms", "ms", 0.0, 60_000.0);
 const RESUME: Bound = bound("resume_delay_ms", "ms", 0.0, 60_000.0);
 
 /// Reads the table; a value that does not stand there has the controller's default.
@@ -101,11 +104,15 @@ fn separation(controller: &Table<'_>, default: &SeparationParams) -> SeparationP
     SeparationParams {
         reaction_time: time(&REACTION, default.reaction_time),
         human_speed_min: table.number_or(&HUMAN_SPEED, default.human_speed_min),
+        human_speed_near: table.number_or(&HUMAN_SPEED_NEAR, default.human_speed_near),
+        near_distance: table.number_or(&NEAR, default.near_distance),
         intrusion: table.number_or(&INTRUSION, default.intrusion),
         sigma_factor: table.number_or(&SIGMAS, default.sigma_factor),
         arm_uncertainty: table.number_or(&UNCERTAINTY, default.arm_uncertainty),
         reserve: table.number_or(&RESERVE, default.reserve),
         hysteresis: table.number_or(&HYSTERESIS, default.hysteresis),
+        speed_up_delay: time(&SPEED_UP, default.speed_up_delay),
         resume_delay: time(&RESUME, default.resume_delay),
+        recede: if table.has("recede") { table.flag("recede") } else { default.recede },
     }
 }

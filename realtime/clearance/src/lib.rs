@@ -6,7 +6,8 @@
 //!
 //! - [`Monitor::clearance`]: the smallest signed distance to the scene and to the
 //!   arm itself, with the link, the object and the points;
-//! - [`Monitor::separation`]: the same towards people, with their velocity;
+//! - [`Monitor::separation`]: the same towards people, with their velocity; [`Monitor::pairs`]: for each
+//!   link and body part;
 //! - [`Monitor::is_clear`], [`Monitor::path_is_clear`]: whether a position, or a whole
 //!   straight motion of the joints, keeps a margin. The motion is swept, not sampled; [`MotionSweep`]
 //!   is the same a look at a time.
@@ -33,7 +34,7 @@ mod sweep;
 mod targets;
 
 pub use body::{ArmBody, BodyError, LINK_CAPSULES_MAX, LinkCapsule, SELF_PAIRS_MAX};
-pub use monitor::{Clearance, Monitor, Separation};
+pub use monitor::{Clearance, Monitor, Pairing, Separation};
 pub use obstacle::SceneFault;
 pub use shapes::{HULL_POINTS_MAX, MESH_TRIANGLES_MAX, ShapeError, Shapes};
 pub use sweep::{MotionSweep, Swept};

@@ -60,6 +60,27 @@ impl Separation {
     };
 }
 
+/// A capsule of the arm, or the carried part, and a capsule of a person.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pairing {
+    /// Link of the arm; the carried part counts as the last.
+    pub link: usize,
+    /// Capsule of the person, its index.
+    pub capsule: usize,
+    /// Signed, metres; −∞ when it came to no number.
+    pub distance: f64,
+    /// Nearest points of the arm and of the person, base frame, metres.
+    pub points: [[f64; 3]; 2],
+}
+
+impl Pairing {
+    #[inline]
+    fn of(near: &Near, link: usize, capsule: usize) -> Self {
+        let distance = if near.distance.is_nan() { f64::NEG_INFINITY } else { near.distance };
+        Self { link, capsule, distance, points: [near.on_first.into(), near.on_second.into()] }
+    }
+}
+
 /// Distances of one arm to one scene and to people.
 ///
 /// # Realtime
@@ -216,6 +237,34 @@ impl Monitor {
             *slot = self.separation_of(&best);
         }
         all
+    }
+
+    /// The pairs of a capsule of the arm, or the carried part, and a capsule of the person that are at most
+    /// `beyond` metres apart, one call of `visit` each. Answers with a bound on how near the others may be:
+    /// never more than the smallest of their distances, +∞ when there is none. −∞, and no call, when a
+    /// number was not finite.
+    pub fn pairs(&self, poses: &LinkPoses, beyond: f64, mut visit: impl FnMut(&Pairing)) -> f64 {
+        let Some(arm) = self.place_for_people(poses) else { return f64::NEG_INFINITY };
+        let mut rest = f64::INFINITY;
+        let wanted = Wanted { limit: beyond, enough: f64::NEG_INFINITY };
+        for body in arm.bodies().iter().filter(|body| body.link != 0) {
+            let gaps = self.people.squared_gaps(&body.centre, &body.half);
+            for (index, (person, gap)) in self.people.all().iter().zip(gaps).enumerate() {
+                let radii = body.radius + self.people.around(index);
+                let near = may_be_nearer(gap, beyond + radii).then(|| arm.near(body, person, wanted)).flatten();
+                match near {
+                    Some(near) => visit(&Pairing::of(&near, body.link, index)),
+                    None if may_be_nearer(gap, rest + radii) => rest = gap.sqrt() - radii,
+                    None => {}
+                }
+            }
+        }
+        rest
+    }
+
+    /// The velocity of each capsule of the people in view, m/s.
+    pub fn human_velocities(&self) -> &[[f64; 3]] {
+        &self.velocities[..self.people.all().len()]
     }
 
     /// Capsules of the people in view.

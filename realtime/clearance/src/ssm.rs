@@ -28,6 +28,35 @@ pub struct Approach {
     pub robot_uncertainty: f64,
 }
 
+/// How fast people are reckoned to come, as in ISO 13855: a speed, and a higher one within arm's reach of the
+/// danger, where a step becomes a grasp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gait {
+    /// Speed farther off than `near`, m/s.
+    pub speed: f64,
+    /// Speed over the last `near` metres, m/s; not below `speed`.
+    pub speed_near: f64,
+    /// Metres.
+    pub near: f64,
+}
+
+impl Gait {
+    /// The longest way, metres, at the end of which a person can arrive within `time` seconds: its last
+    /// `near` metres are made at `speed_near`, what comes before at `speed`.
+    pub fn reach(&self, time: f64) -> f64 {
+        let hurried = self.near / self.speed_near;
+        if time <= hurried { self.speed_near * time } else { self.near + self.speed * (time - hurried) }
+    }
+
+    /// The gait of somebody who is measured to be this fast.
+    #[must_use]
+    pub fn at_least(&self, measured: f64) -> Self {
+        // Written so that a speed that is no number stays one.
+        let over = |speed: f64| if measured <= speed { speed } else { measured };
+        Self { speed: over(self.speed), speed_near: over(self.speed_near), near: self.near }
+    }
+}
+
 /// The protective separation `S_p`, metres. A speed away counts as 0, so nobody is owed less than
 /// standing still would give. Infinite when a number is not finite.
 pub fn protective_separation(approach: &Approach) -> f64 {
@@ -84,6 +113,20 @@ mod tests {
         assert!((protective_separation(&BRISK) - 0.227).abs() < 1e-12);
         let sensed = Approach { intrusion: 0.1, human_uncertainty: 0.03, robot_uncertainty: 0.002, ..BRISK };
         assert!((protective_separation(&sensed) - 0.359).abs() < 1e-12);
+    }
+
+    /// Half a metre at 2.0 m/s, the rest at 1.6 m/s; whoever is faster than that is at least as fast as measured.
+    #[test]
+    fn people_hurry_when_near() {
+        let gait = Gait { speed: 1.6, speed_near: 2.0, near: 0.5 };
+        for (time, reach) in [(0.0, 0.0), (0.1, 0.2), (0.25, 0.5), (0.35, 0.66)] {
+            assert!((gait.reach(time) - reach).abs() < 1e-12, "{time} s");
+        }
+        assert_eq!(gait.at_least(1.0), gait);
+        assert_eq!(gait.at_least(1.8), Gait { speed: 1.8, ..gait });
+        assert!((gait.at_least(3.0).reach(0.35) - 1.05).abs() < 1e-12);
+        assert!(gait.at_least(f64::NAN).reach(0.1).is_nan());
+        assert_eq!(Gait { speed_near: 0.0, speed: 0.0, near: 0.5 }.reach(1.0), 0.0);
     }
 
     /// Moving apart owes no less than standing still.

@@ -1,54 +1,63 @@
-//! Speed and separation: how fast the arm may go with a person where they are.
+//! Speed and separation: how fast the arm may go with people where they are.
 //!
-//! Two answers from one formula, ISO/TS 15066 5.5.4:
-//! - *required*: the separation owed in the state about to be commanded, with
-//!   the stop that would follow it known exactly. Less than that while moving is
-//!   a protective stop.
+//! Two answers from one formula, ISO/TS 15066 5.5.4, for each pair of a link and a body part:
+//! - *margin*: what there is beyond the separation owed in the state about to be
+//!   commanded, with the stop that would follow it known exactly. Less than
+//!   nothing while moving is a protective stop.
 //! - *level*: the largest share of the path's speed at which the separation owed
 //!   would still leave a reserve. The arm slows, and waits, before it must be
-//!   stopped; to speed up again takes some distance more than to slow down.
+//!   stopped; to speed up again takes some distance more than to slow down, for
+//!   some time.
 //!
 //! A law that slows for a person brakes as hard as a stop does. The separation
 //! owed then shrinks as fast as a person of the credited speed can come nearer,
 //! so a protective stop for separation means somebody appeared or was faster.
+//!
+//! **Moving away.** The speeds of the formula are those towards each other. Where
+//! the policy says so, a link owes nothing to a body part it moves away from and
+//! which does not follow it: to slow it down would only keep it there longer.
 
-use tandem_clearance::{Separation, ssm};
+use tandem_clearance::ssm::{self, Gait};
 use tandem_msg::Stamp;
 use tandem_trajectory::State;
 
 use crate::SeparationParams;
 use crate::law::{Law, LawLimits, Refused, Stop};
+use crate::people::{Pair, People};
 
 /// Shares of the path's speed. Level 0 is to wait, level k is entry k - 1.
 pub(crate) const LEVELS: [f64; 8] = [0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0];
 /// Stopping time that is assumed before there is a path, s.
 const REST_STOP: f64 = 0.12;
+/// Nobody farther off than this has ever mattered to an arm at rest, metres.
+pub(crate) const FAR: f64 = 2.0;
+/// Somebody slower than this stands, m/s.
+const STANDING: f64 = 0.1;
 
-/// Where a person is with respect to the arm, in one cycle.
+/// What a stop takes that does not begin at once.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Person {
-    /// Distance at the set-point, metres.
-    pub(crate) distance: f64,
-    /// Speed towards the arm that is reckoned with, m/s.
-    pub(crate) speed: f64,
-    /// Age of what is known, s.
-    pub(crate) age: f64,
-    /// Standard deviation of their position, metres.
-    pub(crate) sigma: f64,
+pub(crate) struct Halt {
+    /// Speed it begins with, length per second.
+    pub(crate) velocity: f64,
+    /// Length up to standstill, what is done before it begins included.
+    pub(crate) way: f64,
+    /// Seconds of braking.
+    pub(crate) duration: f64,
 }
 
-impl Person {
-    pub(crate) fn new(separation: &Separation, age: f64, sigma: f64, params: &SeparationParams) -> Self {
-        let closing: f64 =
-            -separation.human_velocity.iter().zip(&separation.direction).map(|(v, d)| v * d).sum::<f64>();
-        // Written so that a speed that is no number stays one: it will stop the arm.
-        let speed = if closing <= params.human_speed_min { params.human_speed_min } else { closing };
-        Self { distance: separation.distance, speed, age, sigma }
-    }
+/// What there is beyond what is owed, and to whom.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Margin {
+    /// Metres; infinite when nobody is in view.
+    pub(crate) spare: f64,
+    /// Separation owed to that pair, metres.
+    pub(crate) owed: f64,
+    /// The pair that has least to spare.
+    pub(crate) pair: Pair,
+}
 
-    fn nobody(&self) -> bool {
-        self.distance == f64::INFINITY
-    }
+impl Margin {
+    pub(crate) const NOBODY: Self = Self { spare: f64::INFINITY, owed: 0.0, pair: Pair::NONE };
 }
 
 /// Chooses the level and knows what is owed.
@@ -61,7 +70,8 @@ pub(crate) struct Governor {
     acceleration: f64,
     jerk: f64,
     level: usize,
-    enough_since: Option<Stamp>,
+    /// Since when there is room to speed up to each level.
+    room_since: [Option<Stamp>; LEVELS.len()],
 }
 
 impl Governor {
@@ -73,7 +83,7 @@ impl Governor {
             acceleration: 1.0,
             jerk: 1.0,
             level: 0,
-            enough_since: None,
+            room_since: [None; LEVELS.len()],
         }
     }
 
@@ -95,73 +105,136 @@ impl Governor {
         if level == 0 { 0.0 } else { LEVELS[(level - 1).min(LEVELS.len() - 1)] }
     }
 
-    /// Length ahead at which the second separation is to be measured, from a state and its stop.
-    pub(crate) fn look_ahead(&self, state: &State, stop: &Stop) -> f64 {
-        let moving = stop.end + state.velocity * self.params.reaction_time.as_secs_f64();
-        moving.max(state.position + self.stops[0].end)
+    /// The stop from a state, as late as it may begin.
+    pub(crate) fn halt(&self, state: &State, stop: &Stop) -> Halt {
+        let before = state.velocity.max(0.0) * self.params.reaction_time.as_secs_f64();
+        let way = (stop.end - state.position).max(0.0) + before;
+        Halt { velocity: state.velocity, way, duration: stop.duration }
     }
 
-    /// Separation owed to a person by an arm that comes nearer by `gradient` metres per length.
-    pub(crate) fn required(&self, person: &Person, velocity: f64, way: f64, duration: f64, gradient: f64) -> f64 {
+    /// Lengths ahead that people are measured along: the way of a stop, at rest that of the slowest one;
+    /// and how the arm would go on.
+    pub(crate) fn look_ahead(&self, halt: &Halt) -> (f64, f64) {
+        let way = halt.way.max(self.stops[0].end);
+        (way, self.halt_from(LEVELS.len() - 1, halt.velocity).way.max(2.0 * way))
+    }
+
+    /// The stop of an arm that is speeding up from a velocity to that of a level.
+    fn halt_from(&self, index: usize, velocity: f64) -> Halt {
+        let (stop, speed) = (&self.stops[index], self.speeds[index]);
+        // While it speeds up, the arm has to take its acceleration back before it can brake.
+        let ramp = self.acceleration.min((self.jerk * (speed - velocity).max(0.0)).sqrt()) / self.jerk;
+        let before = ramp + self.params.reaction_time.as_secs_f64();
+        Halt { velocity: speed, way: stop.end + speed * before, duration: stop.duration + ramp }
+    }
+
+    /// Distance beyond which nobody changes anything, when the arm travels up to `rate` metres per length.
+    pub(crate) fn horizon(&self, rate: f64, (age, sigma): (f64, f64)) -> f64 {
+        let top = LEVELS.len() - 1;
+        let halt = self.halt_from(top, 0.0);
+        let kept = self.params.reserve + self.params.hysteresis;
+        let horizon = self.owed_standing(&halt, age, sigma, f64::NEG_INFINITY) + rate * halt.way + kept;
+        if horizon.is_finite() { horizon } else { FAR }
+    }
+
+    /// Separation owed, beyond what the arm comes nearer, to a body part measured to close in at a speed.
+    fn owed_standing(&self, halt: &Halt, age: f64, sigma: f64, closing: f64) -> f64 {
+        let reaction_time = self.params.reaction_time.as_secs_f64() + age;
+        let time = reaction_time + halt.duration;
+        let gait = Gait {
+            speed: self.params.human_speed_min,
+            speed_near: self.params.human_speed_near,
+            near: self.params.near_distance,
+        };
+        let reach = gait.at_least(closing).reach(time);
         ssm::protective_separation(&ssm::Approach {
-            human_speed: person.speed,
-            robot_speed: velocity * gradient,
-            reaction_time: self.params.reaction_time.as_secs_f64() + person.age,
-            stopping_time: duration,
-            stopping_distance: way * gradient,
+            human_speed: if time > 0.0 { reach / time } else { 0.0 },
+            robot_speed: 0.0,
+            reaction_time,
+            stopping_time: halt.duration,
+            stopping_distance: 0.0,
             intrusion: self.params.intrusion,
-            human_uncertainty: self.params.sigma_factor * person.sigma,
+            human_uncertainty: self.params.sigma_factor * sigma,
             robot_uncertainty: self.params.arm_uncertainty,
         })
     }
 
-    /// Separation owed by an arm at rest before it may start.
-    pub(crate) fn required_at_rest(&self, person: &Person) -> f64 {
-        self.required(person, 0.0, 0.0, REST_STOP, 0.0)
+    /// The pair that has least to spare if the arm were stopped so; of a pair that it leaves, `to_go_on`
+    /// asks that it would leave it further.
+    fn margin_of(&self, people: &People, halt: &Halt, to_go_on: bool) -> Margin {
+        let standing = self.owed_standing(halt, people.age, people.sigma, f64::NEG_INFINITY);
+        // Length to metres, by what was measured ahead. What the arm does before it brakes is part of that way.
+        let scale = if people.way > 0.0 { halt.way / people.way } else { 0.0 };
+        let away = if people.way > 0.0 { halt.velocity / people.way } else { 0.0 };
+        let mut least = Margin { spare: f64::INFINITY, owed: 0.0, pair: people.nearest };
+        for pair in people.pairs() {
+            let left = self.params.recede
+                && pair.retreat > 0.0
+                && (pair.leaves || !to_go_on)
+                && pair.distance > 0.0
+                && pair.closing <= (away * pair.retreat).max(STANDING);
+            if left {
+                continue;
+            }
+            let owed = if pair.closing <= self.params.human_speed_min {
+                standing + pair.approach * scale
+            } else {
+                self.owed_standing(halt, people.age, people.sigma, pair.closing) + pair.approach * scale
+            };
+            let spare = pair.distance - owed;
+            // Written so that what is no number is least.
+            if !(spare >= least.spare) {
+                least = Margin { spare: if spare.is_nan() { f64::NEG_INFINITY } else { spare }, owed, pair: *pair };
+            }
+        }
+        least
+    }
+
+    /// The pair that has least to spare if the arm were stopped so.
+    pub(crate) fn margin(&self, people: &People, halt: &Halt) -> Margin {
+        self.margin_of(people, halt, false)
+    }
+
+    /// The margin of an arm at rest before it may start.
+    pub(crate) fn margin_at_rest(&self, people: &People) -> Margin {
+        self.margin(people, &Halt { velocity: 0.0, way: 0.0, duration: REST_STOP })
     }
 
     /// Keeps the record of whether an arm off any path might start.
-    pub(crate) fn watch_at_rest(&mut self, now: Stamp, person: &Person) {
-        let enough = person.nobody()
-            || person.distance >= self.required_at_rest(person) + self.params.reserve + self.params.hysteresis;
-        self.record(now, enough);
+    pub(crate) fn watch_at_rest(&mut self, now: Stamp, people: &People) {
+        let enough = self.margin_at_rest(people).spare >= self.params.reserve + self.params.hysteresis;
+        for since in &mut self.room_since {
+            *since = if enough { since.or(Some(now)) } else { None };
+        }
     }
 
     /// Whether there was room for an arm at rest to start, when last asked.
     pub(crate) fn enough(&self) -> bool {
-        self.enough_since.is_some()
+        self.room_since[0].is_some()
     }
 
-    fn record(&mut self, now: Stamp, enough: bool) {
-        self.enough_since = if enough { self.enough_since.or(Some(now)) } else { None };
-    }
-
-    /// Chooses the level for the next cycle. `velocity` is the law's; `required` is what is owed
-    /// now: with less than the reserve above it the law goes over into its stop, which takes the
-    /// separation owed down as fast as a person of the credited speed can come nearer.
-    pub(crate) fn choose(&mut self, now: Stamp, person: &Person, gradient: f64, velocity: f64, required: f64) -> usize {
+    /// Chooses the level for the next cycle. With less than the reserve beyond what is owed by the stop from
+    /// here, the law goes over into that stop, which takes the separation owed down as fast as a person of
+    /// the credited speed can come nearer.
+    pub(crate) fn choose(&mut self, now: Stamp, people: &People, halt: &Halt) -> usize {
+        let velocity = halt.velocity;
         let standing = velocity <= 0.0;
-        let mut best = 0;
-        if person.nobody() {
-            best = LEVELS.len();
-        } else {
-            let room = standing || person.distance >= required + self.params.reserve;
-            for (index, (stop, speed)) in self.stops.iter().zip(&self.speeds).enumerate() {
-                // While it speeds up, the arm has to take its acceleration back before it can brake.
-                let ramp = self.acceleration.min((self.jerk * (speed - velocity).max(0.0)).sqrt()) / self.jerk;
-                let owed = self.required(person, *speed, stop.end + speed * ramp, stop.duration + ramp, gradient);
-                let extra = if index + 1 > self.level { self.params.hysteresis } else { 0.0 };
-                if room && person.distance >= owed + self.params.reserve + extra {
-                    best = index + 1;
-                }
-            }
+        if people.nobody_in_view() {
+            self.room_since = self.room_since.map(|since| since.or(Some(now)));
+            self.level = LEVELS.len();
+            return self.level;
         }
-        self.record(now, best > 0);
-        if standing && self.level == 0 {
-            let delay = self.params.resume_delay;
-            let waited = self.enough_since.is_some_and(|since| since.age_at(now) >= delay);
-            if !waited {
-                best = 0;
+        let delay = if standing && self.level == 0 { self.params.resume_delay } else { self.params.speed_up_delay };
+        let braking = !standing && !(self.margin_of(people, halt, true).spare >= self.params.reserve);
+        let mut best = 0;
+        for index in 0..LEVELS.len() {
+            let spare = self.margin_of(people, &self.halt_from(index, velocity), true).spare;
+            let room = spare >= self.params.reserve + self.params.hysteresis;
+            let since = &mut self.room_since[index];
+            *since = if room { since.or(Some(now)) } else { None };
+            let up = since.is_some_and(|since| since.age_at(now) >= delay);
+            if !braking && (up || index < self.level && spare >= self.params.reserve) {
+                best = index + 1;
             }
         }
         self.level = best;
@@ -172,27 +245,32 @@ impl Governor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::time::Duration;
+
+    /// Slower than the slowest level.
+    const SLOW: Halt = Halt { velocity: 0.01, way: 0.001, duration: 0.02 };
 
     fn governor() -> Governor {
-        let mut governor = Governor::new(&SeparationParams::default());
+        let params = SeparationParams { resume_delay: Duration::ZERO, speed_up_delay: Duration::ZERO, ..Default::default() };
+        governor_of(&params)
+    }
+
+    fn governor_of(params: &SeparationParams) -> Governor {
+        let mut governor = Governor::new(params);
         let limits = LawLimits { velocity: 1.0, acceleration: 5.0, jerk: 50.0 };
         governor.take(&limits).expect("limits are usable");
         governor
     }
 
-    fn person(distance: f64) -> Person {
-        Person { distance, speed: 1.6, age: 0.001, sigma: 0.01 }
-    }
-
     fn level_at(governor: &mut Governor, distance: f64) -> usize {
-        governor.choose(Stamp(0), &person(distance), 1.0, 0.5, 0.0)
+        governor.choose(Stamp(0), &People::at(distance), &SLOW)
     }
 
     /// Nearer is never faster, nobody is full speed, touching is no speed.
     #[test]
     fn the_level_falls_with_the_distance() {
         let mut governor = governor();
-        assert_eq!(level_at(&mut governor, f64::INFINITY), LEVELS.len());
+        assert_eq!(governor.choose(Stamp(0), &People::nobody(), &SLOW), LEVELS.len());
         let mut last = LEVELS.len();
         for millimetres in (0..2_000).rev() {
             let level = level_at(&mut governor, f64::from(millimetres) * 1e-3);
@@ -219,5 +297,55 @@ mod tests {
             }
             assert!(changes <= 1, "{centre} cm: {changes} changes");
         }
+    }
+
+    /// To speed up takes room for a while; to slow down takes one look.
+    #[test]
+    fn it_speeds_up_late_and_slows_at_once() {
+        let mut governor = governor_of(&SeparationParams::default());
+        let delay = SeparationParams::default().speed_up_delay;
+        let mut at = |ms: u64, distance: f64| {
+            governor.choose(Stamp(ms * 1_000_000), &People::at(distance), &SLOW)
+        };
+        at(0, 1.9);
+        assert_eq!(at(500, 1.9), LEVELS.len());
+        let near = at(501, 0.5);
+        assert!(near < LEVELS.len());
+        let soon = 502 + u64::try_from(delay.as_millis()).expect("short") - 1;
+        for ms in 502..=soon {
+            assert_eq!(at(ms, 1.9), near, "after {ms} ms");
+        }
+        assert_eq!(at(soon + 1, 1.9), LEVELS.len());
+        assert_eq!(at(soon + 2, 0.5), near);
+    }
+
+    /// A link owes its full separation to a part it nears or passes, nothing to one it leaves, unless that one follows.
+    #[test]
+    fn only_what_is_left_behind_is_owed_nothing() {
+        let halt = Halt { velocity: 0.5, way: 0.1, duration: 0.2 };
+        let owed = |approach: f64, retreat: f64, closing: f64, recede: bool| {
+            let governor = governor_of(&SeparationParams { recede, ..SeparationParams::default() });
+            let mut people = People::at(0.05);
+            *people.first() = Pair { approach, retreat, closing, ..*people.first() };
+            let margin = governor.margin(&people, &halt);
+            assert_eq!(margin.spare == f64::INFINITY, margin.owed == 0.0);
+            margin.owed
+        };
+        let standing = owed(0.0, 0.0, 0.0, true);
+        assert!(standing > 0.4, "{standing}");
+        assert!((owed(0.05, 0.0, 0.0, true) - standing - 0.05).abs() < 1e-12);
+        assert_eq!(owed(0.0, 0.1, 0.0, true), 0.0);
+        assert_eq!(owed(0.0, 0.1, 0.4, true), 0.0, "slower than the arm");
+        assert_eq!(owed(0.0, 0.1, 0.6, true), standing, "faster than the arm");
+        assert_eq!(owed(0.0, 0.1, f64::NAN, true), f64::INFINITY);
+        assert_eq!(owed(0.0, 0.1, 0.0, false), standing, "the policy says no");
+
+        let mut people = People::at(0.05);
+        *people.first() = Pair { retreat: 0.1, ..*people.first() };
+        let mut governor = governor_of(&SeparationParams::default());
+        assert_eq!(governor.choose(Stamp(0), &people, &halt), 0, "it would turn back");
+        people.first().leaves = true;
+        let levels = [0, 100_000_000].map(|at| governor.choose(Stamp(at), &people, &halt));
+        assert_eq!(levels[1], LEVELS.len());
     }
 }

@@ -3,19 +3,20 @@
 //! 1. *Clearance* at the set-point, to scene and self, at least its floor while moving.
 //! 2. *Braking*: the stop that would follow ends where the path was swept and found
 //!    clear with the present scene, part and permissions. A stop never leaves the path.
-//! 3. *Separation*: the person is owed no more than there is, at the set-point and at
-//!    the end of that stop.
+//! 3. *Separation*: no body part is owed more than there is, by any link, on all the way
+//!    of that stop.
 //!
 //! The swept part of the path is kept and extended, so an undisturbed motion costs
 //! one clearance query a cycle; a changed scene makes the sweep start again from
 //! where the arm is.
 
-use tandem_clearance::{ArmBody, Clearance, Monitor, Separation};
+use tandem_clearance::{ArmBody, Clearance, Monitor};
 use tandem_kinematics::{Chain, LinkPoses};
 use tandem_msg::{AttachedPart, HumanState, Scene};
 
 use crate::Joints;
 use crate::path::Path;
+use crate::people::{Ahead, People};
 use crate::plan::{Leg, Touch};
 use crate::sweep::Sweep;
 
@@ -36,7 +37,7 @@ pub(crate) struct Guard {
     poses: LinkPoses,
     at: Joints,
     clearance: Clearance,
-    separation: Separation,
+    people: People,
     stale: bool,
 }
 
@@ -46,7 +47,6 @@ impl Guard {
         let at = [f64::NAN; tandem_msg::JOINTS_MAX];
         let poses = chain.forward(&[0.0; tandem_msg::JOINTS_MAX]);
         let clearance = monitor.clearance(&poses);
-        let separation = monitor.separation(&poses);
         Self {
             monitor,
             sweep: Sweep::default(),
@@ -57,7 +57,7 @@ impl Guard {
             poses,
             at,
             clearance,
-            separation,
+            people: People::nobody(),
             stale: true,
         }
     }
@@ -127,7 +127,7 @@ impl Guard {
         self.floor
     }
 
-    /// Measures clearance and separation at a position; clearance only where something has changed.
+    /// Measures the clearance at a position, where something has changed.
     pub(crate) fn measure(&mut self, chain: &Chain, position: &Joints) {
         if self.stale || *position != self.at {
             self.poses = chain.forward(position);
@@ -135,19 +135,33 @@ impl Guard {
             self.at = *position;
             self.stale = false;
         }
-        self.separation = self.monitor.separation(&self.poses);
     }
 
-    /// Distance to the nearest person at another position.
-    pub(crate) fn distance_at(&self, chain: &Chain, position: &Joints) -> f64 {
-        self.monitor.separation(&chain.forward(position)).distance
+    /// Measures people up to `horizon` metres off from the position measured last, known with this age and deviation.
+    pub(crate) fn look_around(&mut self, chain: &Chain, horizon: f64, known: (f64, f64)) {
+        self.people.measure(&self.monitor, chain, &self.poses, None, horizon, known);
+    }
+
+    /// The same from the position measured last, which is `from` on a path, and along its next `way`, and
+    /// `onward` beyond that.
+    pub(crate) fn look_along(
+        &mut self,
+        chain: &Chain,
+        path: &Path,
+        (from, way, onward): (f64, f64, f64),
+        horizon: impl FnOnce(f64) -> f64,
+        known: (f64, f64),
+    ) {
+        let [way, onward] = [way, onward].map(|way| way.min(path.length() - from).max(0.0));
+        let ahead = Ahead { path, from, way, onward, rate: self.rate };
+        self.people.measure(&self.monitor, chain, &self.poses, Some(&ahead), horizon(self.rate), known);
     }
 
     pub(crate) fn clearance(&self) -> &Clearance {
         &self.clearance
     }
 
-    pub(crate) fn separation(&self) -> &Separation {
-        &self.separation
+    pub(crate) fn people(&self) -> &People {
+        &self.people
     }
 }

@@ -45,7 +45,8 @@ pub(crate) struct Law {
     time: f64,
     state: State,
     stopping: bool,
-    level: usize,
+    /// Share of the limit's speed it was made for; 0 when for none.
+    share: f64,
 }
 
 /// The generator refused: a state or a limit is not a number. An internal fault.
@@ -62,13 +63,13 @@ impl Law {
             ..Input::default()
         };
         let trajectory = Trajectory::calculate(&input).map_err(|_| Refused)?;
-        Ok(Self { trajectory, time: 0.0, state: from, stopping: false, level: 0 })
+        Ok(Self { trajectory, time: 0.0, state: from, stopping: false, share: 0.0 })
     }
 
     /// To rest as soon as possible, from any state.
     pub(crate) fn stop(from: State, limits: &LawLimits) -> Result<Self, Refused> {
         let trajectory = Trajectory::stop(&[from], &[limits.symmetric()]).map_err(|_| Refused)?;
-        Ok(Self { trajectory, time: 0.0, state: from, stopping: true, level: 0 })
+        Ok(Self { trajectory, time: 0.0, state: from, stopping: true, share: 0.0 })
     }
 
     /// What a stop from a state takes.
@@ -78,20 +79,17 @@ impl Law {
         Ok(Stop { duration, end: law.trajectory.at(duration)[0].position })
     }
 
-    /// The law that goes on at a level of speed: to `length`, no faster than `share` of the limit, or
-    /// to rest at level 0.
+    /// The law that goes on at a share of the limit's speed: to `length`, or to rest at share 0.
     ///
     /// Slowing down begins as the stop does, so that the separation owed falls as fast as it can,
     /// and lets go of the brake in time to meet the new speed from above.
-    pub(crate) fn at_level(&self, level: usize, share: f64, length: f64, limits: &LawLimits) -> Result<Self, Refused> {
+    pub(crate) fn at_share(&self, share: f64, length: f64, limits: &LawLimits) -> Result<Self, Refused> {
         /// Rounding.
         const ABOVE: f64 = 1.0 + 1e-6;
-        /// A law that is to be made again in the next cycle.
-        const PASSING: usize = usize::MAX;
         let State { velocity, acceleration, .. } = self.state;
         let slower = limits.scaled(share);
         let braking = if self.stopping { Ok(*self) } else { Self::stop(self.state, limits) };
-        if level == 0 {
+        if share <= 0.0 {
             return braking;
         }
         if velocity > slower.velocity * ABOVE {
@@ -101,10 +99,10 @@ impl Law {
                 return braking;
             }
             let passing = LawLimits { velocity, ..*limits };
-            return Ok(Self { level: PASSING, ..Self::to(length, self.state, &passing)? });
+            return Self::to(length, self.state, &passing);
         }
-        if self.stopping || self.level != level {
-            return Ok(Self { level, ..Self::to(length, self.state, &slower)? });
+        if self.stopping || self.share != share {
+            return Ok(Self { share, ..Self::to(length, self.state, &slower)? });
         }
         Ok(*self)
     }

@@ -15,7 +15,7 @@
 //! | task in hand | `job`, `effector` |
 //! | search a path | `plan`, `line`, `reach`, `sweep` |
 //! | follow it | `path`, `law`, `motion` |
-//! | check the next command | `guard`, `governor` |
+//! | check the next command | `guard`, `people`, `governor` |
 //!
 //! **Invariant:** an arm that engages is met where it is: the first command
 //! continues its measured position and velocity.
@@ -37,6 +37,7 @@ mod line;
 mod motion;
 mod params;
 mod path;
+mod people;
 mod plan;
 mod reach;
 mod role;

@@ -72,6 +72,10 @@ pub struct SeparationParams {
     pub reaction_time: Duration,
     /// Speed towards the arm that every person is credited with, m/s; a measured closing speed counts when higher.
     pub human_speed_min: f64,
+    /// The same within `near_distance` of the arm, m/s (ISO 13855: 2.0 m/s up to 0.5 m).
+    pub human_speed_near: f64,
+    /// Distance up to which people are credited with `human_speed_near`, metres.
+    pub near_distance: f64,
     /// `C`: how far a limb may reach before it is tracked, metres.
     pub intrusion: f64,
     /// `Z_d`: standard deviations of the tracked position that are added.
@@ -82,8 +86,12 @@ pub struct SeparationParams {
     pub reserve: f64,
     /// Further distance before the arm speeds up again, metres.
     pub hysteresis: f64,
+    /// How long that distance must last before the arm speeds up again.
+    pub speed_up_delay: Duration,
     /// How long the distance must suffice before an arm at rest starts again.
     pub resume_delay: Duration,
+    /// Whether a link owes nothing to a body part it moves away from and which does not follow it.
+    pub recede: bool,
 }
 
 impl Default for SeparationParams {
@@ -91,12 +99,16 @@ impl Default for SeparationParams {
         Self {
             reaction_time: Duration::from_millis(10),
             human_speed_min: 1.6,
+            human_speed_near: 2.0,
+            near_distance: 0.5,
             intrusion: 0.03,
             sigma_factor: 3.0,
             arm_uncertainty: 0.005,
             reserve: 0.03,
             hysteresis: 0.04,
+            speed_up_delay: Duration::from_millis(100),
             resume_delay: Duration::from_millis(200),
+            recede: true,
         }
     }
 }
@@ -217,11 +229,15 @@ impl Params {
         let separation = &self.separation;
         value("separation.reaction_time", ms(separation.reaction_time), 0.0, 500.0, "ms");
         value("separation.human_speed_min", separation.human_speed_min, 0.0, 3.0, "m/s");
+        let faster = separation.human_speed_min;
+        value("separation.human_speed_near", separation.human_speed_near, faster, 4.0, "m/s");
+        value("separation.near_distance", separation.near_distance, 0.0, 2.0, "m");
         value("separation.intrusion", separation.intrusion, 0.0, 1.0, "m");
         value("separation.sigma_factor", separation.sigma_factor, 0.0, 6.0, "sigma");
         value("separation.arm_uncertainty", separation.arm_uncertainty, 0.0, 0.1, "m");
         value("separation.reserve", separation.reserve, 0.0, 0.5, "m");
         value("separation.hysteresis", separation.hysteresis, 0.0, 0.5, "m");
+        value("separation.speed_up_delay", ms(separation.speed_up_delay), 0.0, 60_000.0, "ms");
         value("separation.resume_delay", ms(separation.resume_delay), 0.0, 60_000.0, "ms");
         if found.is_empty() { Ok(()) } else { Err(ParamsError(found)) }
     }

@@ -120,7 +120,7 @@ fn the_arm_slows_with_the_distance() {
         assert_eq!(cell.status().stop_count, 0);
         fastest
     };
-    let speeds = [4.0, 1.65, 1.5].map(fastest);
+    let speeds = [4.0, 1.55, 1.5].map(fastest);
     assert!(speeds[0] > speeds[1] + 0.05 && speeds[1] > speeds[2] + 0.05, "{speeds:?}");
 }
 

@@ -241,10 +241,13 @@ pub struct MotionStatus {
     pub clearance: f64,
     /// Smallest clearance since the task began, metres.
     pub clearance_min: f64,
-    /// Distance to the nearest person, metres; infinite when nobody is in view.
+    /// Distance to the part of a person that has least to spare beyond what it is owed, metres; infinite when
+    /// nobody is in view.
     pub separation: f64,
-    /// Distance that is owed to that person now, metres.
+    /// Distance that is owed to that part now, metres.
     pub separation_required: f64,
+    /// Seconds a stop from the commanded state would take; 0 at rest.
+    pub stopping_time: f64,
     /// Share of nominal speed in use, 0 to 1.
     pub speed: f64,
     /// Speed of the TCP, m/s.
@@ -258,7 +261,7 @@ pub struct MotionStatus {
     /// Where the TCP is, by the measured joints.
     pub base_from_tcp: Pose,
 }
-message!(MotionStatus, 208);
+message!(MotionStatus, 216);
 
 /// Everything fixed or placed that the arm must not touch, supervisor to controller.
 #[derive(Clone, Copy, Debug)]

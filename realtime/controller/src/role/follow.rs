@@ -1,12 +1,11 @@
 //! The next set-point: made, checked, and only then sent.
 
 use tandem_msg::{JOINTS_MAX, Stamp, StopCategory, StopCause, StopState};
-use tandem_trajectory::State;
 
 use super::Controller;
-use crate::governor::{Governor, Person};
+use crate::governor::{FAR, Governor};
 use crate::inputs::Heard;
-use crate::law::{Law, Refused, Stop};
+use crate::law::{Law, Refused};
 use crate::stop::{Causes, Seen};
 
 impl Controller {
@@ -26,10 +25,10 @@ impl Controller {
             }
         } else {
             self.guard.measure(&self.chain, &self.motion.set().position);
-            let person = self.person(now);
-            self.required =
-                if person.distance == f64::INFINITY { 0.0 } else { self.governor.required_at_rest(&person) };
-            self.governor.watch_at_rest(now, &person);
+            self.guard.look_around(&self.chain, FAR, self.known_of_people(now));
+            self.margin = self.governor.margin_at_rest(self.guard.people());
+            self.stopping_time = 0.0;
+            self.governor.watch_at_rest(now, self.guard.people());
         }
         if self.refused {
             causes.add(StopCause::Internal);
@@ -81,13 +80,13 @@ impl Controller {
     /// The law one period on, for the level chosen in the cycle before.
     fn next_law(&self, law: &Law, go: bool) -> Result<Law, Refused> {
         let level = if go { self.law_level } else { 0 };
-        let next = law.at_level(level, Governor::share(level), self.motion.path().length(), self.motion.limits())?;
+        let next = law.at_share(Governor::share(level), self.motion.path().length(), self.motion.limits())?;
         Ok(next.advanced(self.period))
     }
 
     /// A stop from where the law is now, one period on.
     fn stopped(&mut self, law: &Law) -> Option<Law> {
-        match law.at_level(0, 0.0, self.motion.path().length(), self.motion.limits()) {
+        match law.at_share(0.0, self.motion.path().length(), self.motion.limits()) {
             Ok(stop) => Some(stop.advanced(self.period)),
             Err(Refused) => {
                 self.refused = true;
@@ -117,41 +116,24 @@ impl Controller {
             causes.add(StopCause::Clearance);
         }
 
-        let person = self.person(now);
-        let level = self.separate(now, &state, &stop, &person, moving, causes);
+        let halt = self.governor.halt(&state, &stop);
+        let seen = self.known_of_people(now);
+        let horizon = |rate| self.governor.horizon(rate, seen);
+        let (way, onward) = self.governor.look_ahead(&halt);
+        let way = (state.position, way, onward);
+        self.guard.look_along(&self.chain, self.motion.path(), way, horizon, seen);
+        self.margin = self.governor.margin(self.guard.people(), &halt);
+        self.stopping_time = stop.duration;
+        if moving && !(self.margin.spare >= 0.0) {
+            causes.add(StopCause::Separation);
+        }
+        let level = self.governor.choose(now, self.guard.people(), &halt);
         if known && !self.guard.blocked() { level } else { 0 }
     }
 
-    /// The separation part of the check.
-    fn separate(
-        &mut self,
-        now: Stamp,
-        state: &State,
-        stop: &Stop,
-        person: &Person,
-        moving: bool,
-        causes: &mut Causes,
-    ) -> usize {
-        let mut gradient = 0.0;
-        self.required = 0.0;
-        if person.distance != f64::INFINITY {
-            let ahead = self.governor.look_ahead(state, stop).min(self.motion.path().length());
-            let way = ahead - state.position;
-            if way > 1e-9 {
-                let there = self.guard.distance_at(&self.chain, &self.motion.path().at(ahead).position);
-                gradient = ((person.distance - there) / way).max(0.0);
-            }
-            let braking = (stop.end - state.position).max(0.0);
-            self.required = self.governor.required(person, state.velocity, braking, stop.duration, gradient);
-            if moving && !(person.distance >= self.required) {
-                causes.add(StopCause::Separation);
-            }
-        }
-        self.governor.choose(now, person, gradient, state.velocity, self.required)
-    }
-
-    fn person(&self, now: Stamp) -> Person {
-        Person::new(self.guard.separation(), self.watch.human_age(now), self.human_sigma, &self.params.separation)
+    /// Age (s) and standard deviation (m) of what is known of people.
+    fn known_of_people(&self, now: Stamp) -> (f64, f64) {
+        (self.watch.human_age(now), self.human_sigma)
     }
 
     /// The last line of defence against a fault in here: finite, no faster than the joints may go.

@@ -12,7 +12,7 @@ use tandem_msg::{
 };
 
 use crate::effector::Effector;
-use crate::governor::Governor;
+use crate::governor::{Governor, Margin};
 use crate::guard::Guard;
 use crate::inputs::{Heard, Watch, arm_follows, run_mode};
 use crate::job::{Job, Stage, pose};
@@ -72,7 +72,9 @@ pub struct Controller {
     /// An internal check failed in this cycle.
     refused: bool,
     started: bool,
-    required: f64,
+    margin: Margin,
+    /// Seconds the stop would take that was checked last.
+    stopping_time: f64,
     tcp_speed: f64,
     base_from_tcp: tandem_msg::Pose,
 }
@@ -109,7 +111,8 @@ impl Controller {
             law_level: 0,
             refused: false,
             started: false,
-            required: 0.0,
+            margin: Margin::NOBODY,
+            stopping_time: 0.0,
             tcp_speed: 0.0,
             base_from_tcp: tandem_msg::Pose::IDENTITY,
             chain,
@@ -274,9 +277,9 @@ impl Controller {
             Stage::Leg(index) => self.search.legs().get(index).map_or(MotionPhase::Idle, |leg| leg.phase),
             _ => MotionPhase::Idle,
         };
-        let (clearance, separation) = (self.guard.clearance(), self.guard.separation());
-        let nearest = if separation.distance < clearance.distance {
-            [separation.link as u32, 1000 + separation.capsule as u32]
+        let (clearance, nearest) = (self.guard.clearance(), self.guard.people().nearest);
+        let nearest = if nearest.distance < clearance.distance {
+            [nearest.link as u32, 1000 + nearest.capsule as u32]
         } else {
             [clearance.link as u32, clearance.object]
         };
@@ -296,8 +299,9 @@ impl Controller {
             nearest,
             clearance: clearance.distance,
             clearance_min: self.job.clearance_min,
-            separation: separation.distance,
-            separation_required: self.required,
+            separation: self.margin.pair.distance,
+            separation_required: self.margin.owed,
+            stopping_time: self.stopping_time,
             speed: Governor::share(self.law_level) * self.job.task.speed,
             tcp_speed: self.tcp_speed,
             elapsed: self.job.elapsed(now),
