@@ -80,6 +80,8 @@ impl Cell {
                 cell.hash = hash;
                 cell.controller.config_hash = hash;
                 cell.controller.home = cell.robot.home;
+                // Link 0 does not move.
+                cell.controller.moving_mass = cell.robot.links.iter().skip(1).map(|link| link.mass).sum();
                 Ok(cell)
             }
             _ => Err(Faults::new(faults)),

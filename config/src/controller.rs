@@ -6,7 +6,7 @@
 use crate::read::{Bound, Table, bound};
 use crate::timing::Timing;
 use core::time::Duration;
-use tandem_controller::{Params, SeparationParams};
+use tandem_controller::{Params, SeparationParams, WALLS_MAX, Wall, Workspace};
 
 const VALIDITY: Bound = bound("command_validity_ms", "ms", 2.0, 200.0);
 const ARM_AGE: Bound = bound("arm_age_max_ms", "ms", 0.25, 100.0);
@@ -28,6 +28,11 @@ const WORK: Bound = bound("planning_work", "samples", 1.0, 100.0);
 const SETTLE: Bound = bound("settle_ms", "ms", 0.0, 2000.0);
 const ACTION: Bound = bound("action_timeout_ms", "ms", 10.0, 600_000.0);
 const LOST: Bound = bound("part_lost_after_ms", "ms", 0.25, 10_000.0);
+const REDUCED: Bound = bound("reduced_speed_max_m_s", "m/s", 0.01, 1.0);
+const REDUCED_WITHIN: Bound = bound("reduced_within_m", "m", 0.0, 10.0);
+const RECOVERY: Bound = bound("recovery_speed_max_m_s", "m/s", 0.001, 0.25);
+const CORNER: Bound = bound("", "m", -5.0, 5.0);
+const DIRECTION: Bound = bound("inwards", "", -1.0, 1.0);
 const REACTION: Bound = bound("reaction_time_ms", "ms", 0.0, 500.0);
 const HUMAN_SPEED: Bound = bound("human_speed_min_m_s", "m/s", 0.0, 3.0);
 const HUMAN_SPEED_NEAR: Bound = bound("human_speed_near_m_s", "m/s", 0.0, 4.0);
@@ -73,6 +78,10 @@ pub(crate) fn read(cell: &Table<'_>, timing: &Timing) -> Params {
         settle: time(&SETTLE, default.settle),
         action_timeout: time(&ACTION, default.action_timeout),
         part_lost_after: time(&LOST, default.part_lost_after),
+        reduced_speed_max: number(&REDUCED, default.reduced_speed_max),
+        reduced_within: number(&REDUCED_WITHIN, default.reduced_within),
+        recovery_speed_max: number(&RECOVERY, default.recovery_speed_max),
+        workspace: workspace(&table),
         separation: separation(&table, &default.separation),
         resume_after_separation: if table.has("resume_after_separation") {
             table.flag("resume_after_separation")
@@ -91,6 +100,43 @@ pub(crate) fn read(cell: &Table<'_>, timing: &Timing) -> Params {
         }
     }
     params
+}
+
+/// `[controller.workspace]`: a box by two corners, and any further walls.
+fn workspace(controller: &Table<'_>) -> Workspace {
+    if !controller.has("workspace") {
+        return Workspace::default();
+    }
+    let Some(table) = controller.table("workspace") else { return Workspace::default() };
+    let walls = table.tables("wall");
+    let walls: Vec<_> = walls
+        .iter()
+        .map(|wall| {
+            let point = wall.numbers(&Bound { key: "point_m", ..CORNER });
+            let inwards: [f64; 3] = wall.numbers(&DIRECTION);
+            if inwards.iter().all(|x| x.abs() < 1e-6) {
+                wall.refuse(DIRECTION.key, "no direction", "a vector that is not 0", "point it into the workspace");
+            }
+            Wall { point, inwards }
+        })
+        .collect();
+    let around = if table.has("min_m") || table.has("max_m") {
+        let [min, max] = ["min_m", "max_m"].map(|key| table.numbers::<3>(&Bound { key, ..CORNER }));
+        let inside = Workspace::within(min, max);
+        if inside.is_none() {
+            let found = format!("{max:?} m");
+            table.refuse("max_m", &found, &format!("above min_m = {min:?} m"), "swap or move the corners");
+        }
+        inside.unwrap_or_default()
+    } else {
+        Workspace::default()
+    };
+    around.and(&walls).unwrap_or_else(|| {
+        let found = format!("{} walls", around.walls().len() + walls.len());
+        let allowed = format!("0..={WALLS_MAX} walls, six of them the box");
+        table.refuse("wall", &found, &allowed, "leave out those that nothing reaches");
+        around
+    })
 }
 
 fn separation(controller: &Table<'_>, default: &SeparationParams) -> SeparationParams {

@@ -239,7 +239,13 @@ fn every_stop_is_followed_by_motion_again() {
         let resumed = |kind: &EventKind| matches!(kind, EventKind::Resumed { cause: of, .. } if *of == cause.name());
         assert_eq!(run.events(resumed), 1, "{cause}");
         let looked = run.fake.prompts.iter().any(|(kind, _)| *kind == PromptKind::Inspect);
-        let eyes = [StopCause::Clearance, StopCause::TrackingError, StopCause::JointLimit, StopCause::Internal];
+        let eyes = [
+            StopCause::Clearance,
+            StopCause::Workspace,
+            StopCause::TrackingError,
+            StopCause::JointLimit,
+            StopCause::Internal,
+        ];
         assert_eq!(looked, eyes.contains(&cause), "{cause}");
     }
 }

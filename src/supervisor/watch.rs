@@ -62,7 +62,11 @@ fn resets_by_rule(cause: StopCause) -> bool {
         | StopCause::InputInvalid
         | StopCause::PlantBraked
         | StopCause::ForeignWriter => true,
-        StopCause::Clearance | StopCause::TrackingError | StopCause::JointLimit | StopCause::Internal => false,
+        StopCause::Clearance
+        | StopCause::Workspace
+        | StopCause::TrackingError
+        | StopCause::JointLimit
+        | StopCause::Internal => false,
     }
 }
 

@@ -13,7 +13,7 @@
 //!   is the same a look at a time.
 //!
 //! [`ssm`] holds the arithmetic of speed and separation monitoring: how far the arm must
-//! stay from a person who moves, and how fast it may go at the distance there is.
+//! stay from a person who moves, and how fast it may go at the distance there is; [`pfl`] that of contacts.
 //!
 //! **Invariant:** no answer is larger than the truth, but for rounding (below 1e-9 m).
 //! Exact: capsules against everything, the part against boxes, capsules and spheres.
@@ -27,6 +27,7 @@ mod lanes;
 mod mesh;
 mod monitor;
 mod obstacle;
+pub mod pfl;
 mod placed;
 mod shapes;
 pub mod ssm;

@@ -251,7 +251,8 @@ mod tests {
     const SLOW: Halt = Halt { velocity: 0.01, way: 0.001, duration: 0.02 };
 
     fn governor() -> Governor {
-        let params = SeparationParams { resume_delay: Duration::ZERO, speed_up_delay: Duration::ZERO, ..Default::default() };
+        let params =
+            SeparationParams { resume_delay: Duration::ZERO, speed_up_delay: Duration::ZERO, ..Default::default() };
         governor_of(&params)
     }
 
@@ -304,9 +305,7 @@ mod tests {
     fn it_speeds_up_late_and_slows_at_once() {
         let mut governor = governor_of(&SeparationParams::default());
         let delay = SeparationParams::default().speed_up_delay;
-        let mut at = |ms: u64, distance: f64| {
-            governor.choose(Stamp(ms * 1_000_000), &People::at(distance), &SLOW)
-        };
+        let mut at = |ms: u64, distance: f64| governor.choose(Stamp(ms * 1_000_000), &People::at(distance), &SLOW);
         at(0, 1.9);
         assert_eq!(at(500, 1.9), LEVELS.len());
         let near = at(501, 0.5);

@@ -12,13 +12,14 @@
 
 use tandem_clearance::{ArmBody, Clearance, Monitor};
 use tandem_kinematics::{Chain, LinkPoses};
-use tandem_msg::{AttachedPart, HumanState, Scene};
+use tandem_msg::{AttachedPart, HumanState, SceneObject, StopCause};
 
 use crate::Joints;
 use crate::path::Path;
 use crate::people::{Ahead, People};
 use crate::plan::{Leg, Touch};
 use crate::sweep::Sweep;
+use crate::workspace::Workspace;
 
 /// Clearance samples a cycle when the sweep has fallen behind the stop: the arm's way in one stop
 /// is rarely more than a few samples long, and where it is, the arm slows until the sweep is ahead.
@@ -62,10 +63,10 @@ impl Guard {
         }
     }
 
-    /// Takes a scene; says whether it is one.
-    pub(crate) fn set_scene(&mut self, scene: &Scene) -> bool {
+    /// Takes the objects of a scene; says whether it is one.
+    pub(crate) fn set_scene(&mut self, objects: &[SceneObject]) -> bool {
         self.changed();
-        self.monitor.set_scene(scene.objects()).is_ok()
+        self.monitor.set_scene(objects).is_ok()
     }
 
     pub(crate) fn set_human(&mut self, human: &HumanState) {
@@ -122,6 +123,21 @@ impl Guard {
         self.sweep.blocked()
     }
 
+    /// The cause of a stop for what is too near at the position measured last.
+    pub(crate) fn cause_here(&self) -> StopCause {
+        cause_of(self.clearance.object)
+    }
+
+    /// The cause of a stop for what the sweep met.
+    pub(crate) fn cause_ahead(&self) -> StopCause {
+        cause_of(self.sweep.blocked_by())
+    }
+
+    /// Clearance at another position.
+    pub(crate) fn clearance_at(&self, chain: &Chain, position: &Joints) -> f64 {
+        self.monitor.clearance(&chain.forward(position)).distance
+    }
+
     /// Smallest clearance a moving arm may have here.
     pub(crate) fn floor(&self) -> f64 {
         self.floor
@@ -164,4 +180,8 @@ impl Guard {
     pub(crate) fn people(&self) -> &People {
         &self.people
     }
+}
+
+fn cause_of(object: u32) -> StopCause {
+    if Workspace::is_wall(object) { StopCause::Workspace } else { StopCause::Clearance }
 }

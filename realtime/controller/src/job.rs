@@ -15,6 +15,8 @@ pub(crate) enum Stage {
     Planning { begun: bool },
     /// On a stretch of the plan.
     Leg(usize),
+    /// On a step out of a contact, or back into the joints' range.
+    Recovering,
     /// At the goal, coming to stillness.
     Settling { since: Stamp },
     /// The tool is at work.
@@ -40,6 +42,8 @@ pub(crate) struct Job {
     pub(crate) dark_since: Option<Stamp>,
     /// Given up while moving: to be ended at rest.
     pub(crate) abandon: Option<MotionFailure>,
+    /// Steps of recovery made.
+    pub(crate) recoveries: u32,
 }
 
 impl Job {
@@ -54,6 +58,7 @@ impl Job {
             touch_before: [0; 8],
             dark_since: None,
             abandon: None,
+            recoveries: 0,
         }
     }
 
@@ -141,6 +146,7 @@ impl Job {
             Stage::Planning { .. } if self.away => MotionPhase::Retract,
             Stage::Planning { .. } => MotionPhase::Planning,
             Stage::Leg(_) => leg,
+            Stage::Recovering => MotionPhase::Depart,
             Stage::Settling { .. } | Stage::Acting { .. } => MotionPhase::Acting,
             Stage::Ended { failure: MotionFailure::None, .. } => MotionPhase::Done,
             Stage::Ended { .. } => MotionPhase::Failed,

@@ -15,7 +15,7 @@
 //! | task in hand | `job`, `effector` |
 //! | search a path | `plan`, `line`, `reach`, `sweep` |
 //! | follow it | `path`, `law`, `motion` |
-//! | check the next command | `guard`, `people`, `governor` |
+//! | check the next command | `guard`, `people`, `governor`, `pace`, `workspace`, `envelope` |
 //!
 //! **Invariant:** an arm that engages is met where it is: the first command
 //! continues its measured position and velocity.
@@ -28,6 +28,7 @@
 #![allow(clippy::neg_cmp_op_on_partial_ord, reason = "`!(a >= b)` is meant: what is no number fails the check")]
 
 mod effector;
+mod envelope;
 mod governor;
 mod guard;
 mod inputs;
@@ -35,6 +36,7 @@ mod job;
 mod law;
 mod line;
 mod motion;
+mod pace;
 mod params;
 mod path;
 mod people;
@@ -43,9 +45,11 @@ mod reach;
 mod role;
 mod stop;
 mod sweep;
+mod workspace;
 
 pub use params::{OutOfRange, Params, ParamsError, SeparationParams};
 pub use role::{Controller, ControllerInputs, ControllerOutputs};
+pub use workspace::{WALLS_MAX, Wall, Workspace};
 
 /// One number per joint, rad or m; entries past the joints in use are 0.
 type Joints = [f64; tandem_msg::JOINTS_MAX];

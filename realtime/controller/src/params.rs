@@ -6,6 +6,8 @@ use core::time::Duration;
 
 use tandem_msg::JOINTS_MAX;
 
+use crate::Workspace;
+
 /// Everything the controller is told about its cell besides the arm itself.
 ///
 /// The values are plain; [`Params::check`] says which of them are out of range
@@ -58,6 +60,16 @@ pub struct Params {
     pub action_timeout: Duration,
     /// How long the part-presence sensor may be dark before a carried part counts as lost.
     pub part_lost_after: Duration,
+    /// Where the arm may be.
+    pub workspace: Workspace,
+    /// Largest speed of the TCP in reduced mode, m/s.
+    pub reduced_speed_max: f64,
+    /// Distance to a person within which the mode is reduced, metres; 0 = only when asked for.
+    pub reduced_within: f64,
+    /// Largest speed of the TCP in recovery mode, m/s.
+    pub recovery_speed_max: f64,
+    /// Mass of all that moves of the arm, kg: bounds its speed where it may touch a person.
+    pub moving_mass: f64,
     /// Protective separation.
     pub separation: SeparationParams,
     /// Whether a stop for separation ends by itself once the person has left; every other cause needs a reset.
@@ -140,6 +152,11 @@ impl Default for Params {
             settle: Duration::from_millis(30),
             action_timeout: Duration::from_secs(20),
             part_lost_after: Duration::from_millis(100),
+            workspace: Workspace::default(),
+            reduced_speed_max: 0.25,
+            reduced_within: 0.0,
+            recovery_speed_max: 0.05,
+            moving_mass: 20.0,
             separation: SeparationParams::default(),
             resume_after_separation: true,
         }
@@ -226,6 +243,10 @@ impl Params {
         value("settle", ms(self.settle), 0.0, 2_000.0, "ms");
         value("action_timeout", ms(self.action_timeout), 10.0, 600_000.0, "ms");
         value("part_lost_after", ms(self.part_lost_after), ms(self.period), 10_000.0, "ms");
+        value("reduced_speed_max", self.reduced_speed_max, 0.01, 1.0, "m/s");
+        value("reduced_within", self.reduced_within, 0.0, 10.0, "m");
+        value("recovery_speed_max", self.recovery_speed_max, 0.001, 0.25, "m/s");
+        value("moving_mass", self.moving_mass, 0.1, 2_000.0, "kg");
         let separation = &self.separation;
         value("separation.reaction_time", ms(separation.reaction_time), 0.0, 500.0, "ms");
         value("separation.human_speed_min", separation.human_speed_min, 0.0, 3.0, "m/s");

@@ -197,7 +197,7 @@ impl Path {
     }
 
     /// Largest travel of the TCP per length, at nine places.
-    fn tcp_rate(&self, chain: &Chain) -> f64 {
+    pub(crate) fn tcp_rate(&self, chain: &Chain) -> f64 {
         let mut largest = 0.0_f64;
         for k in 0..=8 {
             let point = self.at(self.length * f64::from(k) / 8.0);

@@ -50,7 +50,7 @@ impl Causes {
 pub(crate) fn category(cause: StopCause) -> StopCategory {
     match cause {
         // The arm is sound and so is what is known of the cell: it may stay under power.
-        StopCause::None | StopCause::Separation | StopCause::Clearance => StopCategory::Two,
+        StopCause::None | StopCause::Separation | StopCause::Clearance | StopCause::Workspace => StopCategory::Two,
         // What is known of the cell or of the arm is in doubt: brakes once it stands.
         StopCause::ArmStale
         | StopCause::HumanStale

@@ -37,13 +37,15 @@ pub(crate) struct Sweep {
     margin: f64,
     floor: f64,
     blocked: bool,
+    /// What blocked it: an object, 0 the arm itself.
+    blocked_by: u32,
 }
 
 impl Sweep {
     /// A walk from `from` on that asks for `margin` metres at the samples and `floor` in between;
     /// `rate` is [`Path::sweep_rate`].
     pub(crate) fn new(from: f64, rate: f64, margin: f64, floor: f64) -> Self {
-        Self { next: from, clear_to: from, rate, margin, floor, blocked: false }
+        Self { next: from, clear_to: from, rate, margin, floor, blocked: false, blocked_by: 0 }
     }
 
     /// A walk that has been made already, to the end of a path.
@@ -60,6 +62,11 @@ impl Sweep {
         self.blocked
     }
 
+    /// The object that was too near; 0 the arm itself.
+    pub(crate) fn blocked_by(&self) -> u32 {
+        self.blocked_by
+    }
+
     pub(crate) fn finished(&self, path: &Path) -> bool {
         self.blocked || self.next > path.length()
     }
@@ -73,10 +80,11 @@ impl Sweep {
             return Swept::Clear;
         }
         let poses = chain.forward(&path.at(self.next).position);
-        let clearance = monitor.clearance(&poses).distance;
+        let found = monitor.clearance(&poses);
+        let clearance = found.distance;
         // Written so that a clearance that is no number blocks.
         if !(clearance >= self.margin) {
-            self.blocked = true;
+            (self.blocked, self.blocked_by) = (true, found.object);
             return Swept::Blocked;
         }
         self.clear_to = self.next;

@@ -37,6 +37,8 @@ coded! {
         Run = 1, "run";
         /// Controlled stop on the path; `Run` goes on from there.
         Pause = 2, "pause";
+        /// Carry out the task at reduced speed.
+        Reduced = 3, "reduced";
     }
 }
 
@@ -154,6 +156,18 @@ coded! {
 }
 
 coded! {
+    /// Which limits the arm moves under.
+    pub enum SafetyMode {
+        /// Those of its files.
+        Normal = 0, "normal";
+        /// A lower speed, by request or because a person is near.
+        Reduced = 1, "reduced";
+        /// Found in contact or outside its limits: slowly out of it, in steps that make nothing worse.
+        Recovery = 2, "recovery";
+    }
+}
+
+coded! {
     /// Whether the arm may keep moving.
     pub enum StopState {
         /// It may.
@@ -206,6 +220,8 @@ coded! {
         Internal = 11, "internal";
         /// A sample came from a replaced writer or another configuration.
         ForeignWriter = 12, "foreign_writer";
+        /// The arm was about to leave its workspace.
+        Workspace = 13, "workspace";
     }
 }
 
@@ -235,6 +251,10 @@ pub struct MotionStatus {
     pub stop_count: u32,
     /// `MotionTask::reset_count` last obeyed.
     pub reset_seen: u32,
+    /// Limits in force.
+    pub mode: Code<SafetyMode>,
+    /// Zero; keeps the layout free of padding.
+    pub reserved: u32,
     /// Arm link (index) and scene object (id; 0 = the arm itself, 1000 + k = capsule k of the person) that are nearest.
     pub nearest: [u32; 2],
     /// Clearance now: smallest distance from arm or carried part to anything it must not touch, metres.
@@ -261,7 +281,7 @@ pub struct MotionStatus {
     /// Where the TCP is, by the measured joints.
     pub base_from_tcp: Pose,
 }
-message!(MotionStatus, 216);
+message!(MotionStatus, 224);
 
 /// Everything fixed or placed that the arm must not touch, supervisor to controller.
 #[derive(Clone, Copy, Debug)]

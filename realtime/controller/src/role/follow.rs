@@ -1,11 +1,14 @@
 //! The next set-point: made, checked, and only then sent.
 
-use tandem_msg::{JOINTS_MAX, Stamp, StopCategory, StopCause, StopState};
+use tandem_msg::{Stamp, StopCategory, StopCause, StopState};
 
 use super::Controller;
+use crate::Joints;
+use crate::envelope;
 use crate::governor::{FAR, Governor};
 use crate::inputs::Heard;
 use crate::law::{Law, Refused};
+use crate::motion::SetPoint;
 use crate::stop::{Causes, Seen};
 
 impl Controller {
@@ -73,14 +76,19 @@ impl Controller {
         self.law_level = choice;
         if let Some(law) = next {
             let set = self.motion.set_point(&law.state());
-            self.motion.commit(law, &set);
+            if self.envelope_fault(&set) == Some(StopCause::Internal) {
+                self.command_fault = true;
+                self.leave(now);
+            } else {
+                self.motion.commit(law, &set);
+            }
         }
     }
 
     /// The law one period on, for the level chosen in the cycle before.
     fn next_law(&self, law: &Law, go: bool) -> Result<Law, Refused> {
-        let level = if go { self.law_level } else { 0 };
-        let next = law.at_share(Governor::share(level), self.motion.path().length(), self.motion.limits())?;
+        let share = if go { self.share() } else { 0.0 };
+        let next = law.at_share(share, self.motion.path().length(), self.motion.limits())?;
         Ok(next.advanced(self.period))
     }
 
@@ -104,16 +112,23 @@ impl Controller {
         };
         let moving = state.velocity > 0.0;
         let set = self.motion.set_point(&state);
-        self.refused |= !self.is_sound(&set.position, &set.velocity);
+        match self.envelope_fault(&set) {
+            Some(StopCause::Internal) => self.refused = true,
+            Some(cause) => causes.add(cause),
+            None => {}
+        }
+        if moving && self.leaves_range(&set.position, &self.motion.path().at(stop.end).position) {
+            causes.add(StopCause::JointLimit);
+        }
 
         self.guard.measure(&self.chain, &set.position);
         if moving && !(self.guard.clearance().distance >= self.guard.floor()) {
-            causes.add(StopCause::Clearance);
+            causes.add(self.guard.cause_here());
         }
         self.guard.sweep(&self.chain, self.motion.path(), state.position, stop.end);
         let known = self.guard.clear_to() + 1e-9 >= stop.end;
         if moving && !known && self.guard.blocked() {
-            causes.add(StopCause::Clearance);
+            causes.add(self.guard.cause_ahead());
         }
 
         let halt = self.governor.halt(&state, &stop);
@@ -131,16 +146,26 @@ impl Controller {
         if known && !self.guard.blocked() { level } else { 0 }
     }
 
+    /// What is wrong with sending a set-point after the last one.
+    fn envelope_fault(&self, set: &SetPoint) -> Option<StopCause> {
+        let fastest = self.params.tcp_speed_max.max(self.params.line_speed_max);
+        envelope::fault(&self.chain, self.motion.set(), set, self.period, fastest)
+    }
+
     /// Age (s) and standard deviation (m) of what is known of people.
     fn known_of_people(&self, now: Stamp) -> (f64, f64) {
         (self.watch.human_age(now), self.human_sigma)
     }
 
-    /// The last line of defence against a fault in here: finite, no faster than the joints may go.
-    fn is_sound(&self, position: &[f64; JOINTS_MAX], velocity: &[f64; JOINTS_MAX]) -> bool {
-        /// Rounding.
-        const SLACK: f64 = 1.01;
-        position.iter().all(|position| position.is_finite())
-            && velocity.iter().zip(&self.velocity_max).all(|(velocity, limit)| velocity.abs() <= limit * SLACK)
+    /// Share of the path's speed in force.
+    pub(super) fn share(&self) -> f64 {
+        Governor::share(self.law_level).min(self.pace.share_max())
+    }
+
+    /// Whether a joint is farther outside its range at `then` than at `now`.
+    fn leaves_range(&self, now: &Joints, then: &Joints) -> bool {
+        self.chain.joints().iter().zip(now.iter().zip(then)).any(|(joint, (now, then))| {
+            *then > joint.position_max.max(*now) + 1e-6 || *then < joint.position_min.min(*now) - 1e-6
+        })
     }
 }

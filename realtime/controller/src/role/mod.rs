@@ -1,6 +1,7 @@
 //! One control cycle, from what was heard to what is commanded.
 
 mod follow;
+mod recover;
 mod task;
 
 use nalgebra::Vector3;
@@ -17,6 +18,7 @@ use crate::guard::Guard;
 use crate::inputs::{Heard, Watch, arm_follows, run_mode};
 use crate::job::{Job, Stage, pose};
 use crate::motion::Motion;
+use crate::pace::Pace;
 use crate::plan::Search;
 use crate::reach::Reach;
 use crate::stop::{Causes, StopMonitor};
@@ -69,8 +71,11 @@ pub struct Controller {
     governor: Governor,
     /// Level the law in force was made for.
     law_level: usize,
+    pace: Pace,
     /// An internal check failed in this cycle.
     refused: bool,
+    /// It failed on a command that was not sent then; counts in the next cycle.
+    command_fault: bool,
     started: bool,
     margin: Margin,
     /// Seconds the stop would take that was checked last.
@@ -109,7 +114,9 @@ impl Controller {
             guard: Guard::new(&chain, body, params.clearance_min),
             governor: Governor::new(&params.separation),
             law_level: 0,
+            pace: Pace::new(),
             refused: false,
+            command_fault: false,
             started: false,
             margin: Margin::NOBODY,
             stopping_time: 0.0,
@@ -125,7 +132,7 @@ impl Controller {
     /// # Realtime
     /// Bounded; no allocation, lock, system call or panic.
     pub fn cycle(&mut self, now: Stamp, inputs: &ControllerInputs<'_>, outputs: &mut ControllerOutputs) {
-        self.refused = false;
+        self.refused = core::mem::take(&mut self.command_fault);
         if !self.started {
             // What the arm did for a controller before this one is no answer to this one.
             self.started = true;
@@ -139,8 +146,12 @@ impl Controller {
         self.take_task(now, inputs.task, &heard);
         let run = if heard.task.good { run_mode(inputs.task) } else { RunMode::Halt };
         let replaced = heard.task.good && !self.job.is_of(inputs.task);
-        let go = self.stop.running() && run == RunMode::Run && !replaced && self.job.abandon.is_none();
+        let go = self.stop.running()
+            && matches!(run, RunMode::Run | RunMode::Reduced)
+            && !replaced
+            && self.job.abandon.is_none();
         self.advance_task(now, go, heard.arm.good);
+        self.pace.update(now, run == RunMode::Reduced, self.guard.people().nearest.distance, &self.params);
         self.follow(now, go, &heard, inputs.task.reset_count, causes);
         self.job.clearance_min = self.job.clearance_min.min(self.guard.clearance().distance);
         self.command(now, heard.arm.good, &mut outputs.command);
@@ -170,8 +181,13 @@ impl Controller {
             if self.scene_key != Some(key) {
                 self.scene_key = Some(key);
                 self.plan_is_current = false;
-                let guarded = self.guard.set_scene(inputs.scene);
-                self.scene_valid = guarded && self.planner.set_scene(inputs.scene.objects()).is_ok();
+                self.scene_valid = match self.params.workspace.enclose(inputs.scene) {
+                    Some((objects, count)) => {
+                        let guarded = self.guard.set_scene(&objects[..count]);
+                        guarded && self.planner.set_scene(&objects[..count]).is_ok()
+                    }
+                    None => false,
+                };
                 if let Stage::Planning { begun } = &mut self.job.stage {
                     *begun = false;
                 }
@@ -252,7 +268,7 @@ impl Controller {
     }
 
     fn plan_anew(&mut self) {
-        if matches!(self.job.stage, Stage::Leg(_) | Stage::Planning { .. }) {
+        if matches!(self.job.stage, Stage::Leg(_) | Stage::Planning { .. } | Stage::Recovering) {
             self.job.stage = Stage::Planning { begun: false };
         }
     }
@@ -296,13 +312,15 @@ impl Controller {
             standstill: u32::from(self.motion.standstill()),
             stop_count: self.stop.count(),
             reset_seen: self.stop.reset_seen(),
+            mode: Code::of(self.pace.mode()),
+            reserved: 0,
             nearest,
             clearance: clearance.distance,
             clearance_min: self.job.clearance_min,
             separation: self.margin.pair.distance,
             separation_required: self.margin.owed,
             stopping_time: self.stopping_time,
-            speed: Governor::share(self.law_level) * self.job.task.speed,
+            speed: self.share() * self.job.task.speed,
             tcp_speed: self.tcp_speed,
             elapsed: self.job.elapsed(now),
             expected: self.job.expected,

@@ -6,7 +6,7 @@ use super::Controller;
 use crate::effector::Answer;
 use crate::inputs::{Heard, task_is_valid};
 use crate::job::Stage;
-use crate::plan::{Goal, Progress, Tools};
+use crate::plan::{Goal, Leg, Progress, Tools};
 
 impl Controller {
     /// Takes a new task once the arm is at rest.
@@ -41,6 +41,11 @@ impl Controller {
         match self.job.stage {
             Stage::Planning { begun } if go && self.motion.at_rest() => self.plan(now, begun),
             Stage::Leg(index) => self.finish_leg(now, index),
+            Stage::Recovering if self.recovery_is_over() => {
+                self.motion.rest();
+                self.pace.recovered();
+                self.plan_anew();
+            }
             Stage::Settling { since } if go && since.age_at(now) >= self.params.settle => {
                 if self.job.acts() {
                     self.effector.begin(&self.job.task, &self.arm.effector);
@@ -90,6 +95,12 @@ impl Controller {
                 self.job.stage = Stage::Settling { since: now };
                 return;
             }
+            if self.is_out_of_range() {
+                if !self.recover() {
+                    self.job.end(MotionFailure::Unreachable, now);
+                }
+                return;
+            }
             self.search.begin(&self.motion.set().position, &goal);
             self.job.stage = Stage::Planning { begun: true };
             self.plan_is_current = true;
@@ -98,7 +109,11 @@ impl Controller {
             Tools { chain: &self.chain, params: &self.params, reach: &self.reach, monitor: &mut self.planner };
         match self.search.work(&mut tools) {
             Progress::Searching => {}
-            Progress::Failed(failure) => self.job.end(failure, now),
+            Progress::Failed(failure) => {
+                if !(self.is_hemmed_in() && self.recover()) {
+                    self.job.end(failure, now);
+                }
+            }
             Progress::Found => {
                 if !self.job.away {
                     self.job.expected = self.job.elapsed(now) + self.search.duration();
@@ -136,17 +151,24 @@ impl Controller {
             }
             return;
         };
-        let usable = leg.limits.are_usable();
-        let prepared = self.motion.follow(&leg.path, &leg.limits).and_then(|()| self.governor.take(&leg.limits));
-        if !usable || prepared.is_err() {
+        let leg = *leg;
+        let from_contact = index == 0 && self.guard.clearance().distance < 0.0;
+        if leg.limits.are_usable() && self.enter(&leg, self.plan_is_current, from_contact) {
+            self.job.stage = Stage::Leg(index);
+        } else {
             self.refused = true;
             self.motion.rest();
             self.job.end(MotionFailure::Unreachable, now);
-            return;
         }
-        self.guard.take(leg, self.job.attached(), self.plan_is_current);
+    }
+
+    /// Sets out on a stretch, `swept` when it was found clear with the scene in force.
+    pub(super) fn enter(&mut self, leg: &Leg, swept: bool, recovering: bool) -> bool {
+        let prepared = self.motion.follow(&leg.path, &leg.limits).and_then(|()| self.governor.take(&leg.limits));
+        self.guard.take(leg, self.job.attached(), swept);
+        self.pace.take(&self.chain, leg, &self.job, &self.params, recovering);
         self.law_level = 0;
-        self.job.stage = Stage::Leg(index);
+        prepared.is_ok()
     }
 
     /// Enters the next stretch where this one has ended, or plans anew where it is blocked.
