@@ -71,6 +71,27 @@ impl Track {
     }
 }
 
+/// Since when the tracked person has not changed by a bit.
+///
+/// A tracker that owns up to an uncertainty is never still: what it repeats to the bit is a frozen picture,
+/// however fresh its stamp, and as old as when it was first seen.
+#[derive(Clone, Copy, Debug, Default)]
+struct Picture {
+    seen: HumanState,
+    since: Stamp,
+}
+
+impl Picture {
+    fn take(&mut self, human: &HumanState) {
+        let same = human.position_sigma > 0.0
+            && human.capsule_count > 0
+            && (human.capsule_count, &human.capsules) == (self.seen.capsule_count, &self.seen.capsules);
+        if !same {
+            (self.seen, self.since) = (*human, human.header.stamp);
+        }
+    }
+}
+
 /// Judgement of all inputs in one cycle.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Heard {
@@ -86,6 +107,7 @@ pub(crate) struct Heard {
 pub(crate) struct Watch {
     arm: Track,
     human: Track,
+    picture: Picture,
     scene: Track,
     task: Track,
 }
@@ -108,7 +130,7 @@ impl Watch {
             &mut causes,
             || arm_is_valid(inputs.arm, speeds),
         );
-        let human = self.human.judge(
+        let mut human = self.human.judge(
             &inputs.human.header,
             now,
             &fresh(params.human_age_max),
@@ -116,6 +138,13 @@ impl Watch {
             &mut causes,
             || human_is_valid(inputs.human),
         );
+        if human.new {
+            self.picture.take(inputs.human);
+        }
+        if human.good && self.picture.since.age_at(now) > params.human_age_max {
+            causes.add(StopCause::HumanStale);
+            human.good = false;
+        }
         let task = self.task.judge(
             &inputs.task.header,
             now,
@@ -139,9 +168,9 @@ impl Watch {
         Heard { causes, arm, human, scene, task }
     }
 
-    /// Age of the last accepted sample of the tracked person, seconds.
+    /// Age of what is known of the tracked person, seconds.
     pub(crate) fn human_age(&self, now: Stamp) -> f64 {
-        self.human.last.stamp.age_at(now).as_secs_f64()
+        self.picture.since.age_at(now).as_secs_f64()
     }
 }
 

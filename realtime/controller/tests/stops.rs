@@ -25,6 +25,8 @@ fn mended(cell: &mut Cell) {
     cell.tamper = None;
 }
 
+const FROZEN: Capsule = Capsule { ends: [[4.0, 0.0, -0.9], [4.0, 0.0, 0.7]], radius: 0.25, velocity: [0.0; 3] };
+
 /// The faults, each with how it begins and how it ends.
 fn faults() -> Vec<Fault> {
     use StopCategory::{One, Two};
@@ -44,6 +46,17 @@ fn faults() -> Vec<Fault> {
             noticed_within: 52,
             begin: |cell| cell.human_alive = false,
             end: |cell| cell.human_alive = true,
+        },
+        Fault {
+            what: "the tracker repeats one picture under fresh stamps",
+            cause: StopCause::HumanStale,
+            category: One,
+            noticed_within: 52,
+            begin: |cell| {
+                cell.person_at(4.0, 0.0, [0.0; 3]);
+                tampered(cell, |_, human, _, _, _| human.capsules[..2].fill(FROZEN));
+            },
+            end: mended,
         },
         Fault {
             what: "the supervisor is silent",
