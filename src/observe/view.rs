@@ -187,9 +187,19 @@ pub struct PerCycle {
 }
 
 impl Quantiles {
+    /// In one pass: a look is taken often, and has many of them.
     pub(crate) fn of(histogram: &Histogram) -> Self {
-        let at = |quantile| histogram.quantile_ns(quantile) as f64 / 1e3;
-        Self { p50_us: at(0.5), p99_us: at(0.99), p99_9_us: at(0.999), max_us: histogram.max_ns() as f64 / 1e3 }
+        let rank = |quantile: f64| (quantile * histogram.total() as f64).ceil().max(1.0) as u64;
+        let mut wanted = [0.5, 0.99, 0.999].map(|quantile| (rank(quantile), 0));
+        let (mut before, mut seen) = (0, 0);
+        for (value_ns, count) in histogram.buckets() {
+            seen += count;
+            let here = wanted.iter_mut().filter(|(rank, _)| (before + 1..=seen).contains(rank));
+            here.for_each(|(_, value)| *value = value_ns.min(histogram.max_ns()));
+            before = seen;
+        }
+        let [p50_us, p99_us, p99_9_us] = wanted.map(|(_, value_ns)| value_ns as f64 / 1e3);
+        Self { p50_us, p99_us, p99_9_us, max_us: histogram.max_ns() as f64 / 1e3 }
     }
 }
 
@@ -336,6 +346,20 @@ mod tests {
         assert_eq!(view.lateness_recent.max_us, 0.01);
         assert_eq!(view.lateness.max_us, 900.0);
         assert_eq!((view.lateness_octaves[0], view.lateness_octaves[10]), (500, 1));
+    }
+
+    /// One pass finds what the histogram itself answers, quantile by quantile.
+    #[test]
+    fn quantiles_in_one_pass_are_the_histograms_own() {
+        let mut histogram = Histogram::default();
+        assert_eq!(Quantiles::of(&histogram), Quantiles::default());
+        for value in (0..5_000_u64).map(|k| k * k % 77_777) {
+            histogram.record(value);
+            let at = |quantile| histogram.quantile_ns(quantile) as f64 / 1e3;
+            let quantiles = Quantiles::of(&histogram);
+            assert_eq!([quantiles.p50_us, quantiles.p99_us, quantiles.p99_9_us], [0.5, 0.99, 0.999].map(at));
+            assert_eq!(quantiles.max_us, at(1.0));
+        }
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::observe::{LoopView, View};
 /// Heights of a bar, from nothing to full.
 const BARS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 /// What stands below the bars of lateness: the lower end of every fourth octave.
-const AXIS: &str = "0  1µs     16µs    256µs   4ms";
+const AXIS: &str = "0 1µs     16µs    256µs   4ms";
 /// A bar and a space.
 const BAR_WIDTH: usize = 2;
 
@@ -24,7 +24,8 @@ pub(super) fn draw(frame: &mut Frame<'_>, view: &View) {
         Constraint::Length(5),
         Constraint::Length(loops + 3),
         Constraint::Length(loops + 3),
-        Constraint::Length(inputs + 2),
+        // One line is longer than most screens are wide.
+        Constraint::Length(inputs + 3),
         Constraint::Min(loops + 2),
     ])
     .areas(frame.area());
@@ -58,7 +59,7 @@ fn alarm(on: bool) -> Style {
 }
 
 fn figures(view: &View) -> Table<'_> {
-    let widths = [11, 8, 5, 10, 9, 7, 8, 24, 15, 16, 6, 6, 8].map(Constraint::Length);
+    let widths = [11, 8, 5, 10, 9, 7, 8, 26, 15, 16, 6, 6, 8].map(Constraint::Length);
     let rows = view.loops.iter().map(|one| {
         let slow = one.rate_hz < 0.9 * one.rate_wanted_hz;
         Row::new(row(one)).style(alarm(slow))
@@ -102,7 +103,7 @@ fn input_ages(view: &View) -> Paragraph<'_> {
         });
         Line::from(format!("{:<11} {}", one.role, ages.collect::<Vec<_>>().join("   ")))
     });
-    Paragraph::new(lines.collect::<Vec<_>>())
+    Paragraph::new(lines.collect::<Vec<_>>()).wrap(Wrap { trim: false })
 }
 
 fn obtained(view: &View) -> Paragraph<'_> {
