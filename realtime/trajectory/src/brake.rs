@@ -20,6 +20,8 @@
 //! ```text
 //! a^2 = (beta a0^2 + 2 (v0 - V)) / (alpha + beta)         zeroing -|a| by the jerk arrives at V
 //! ```
+//!
+//! A target outside the limits gets a *suffix*: such a prefix, seen backwards in time.
 
 use crate::{extremal::Joint, motion::Phase, sqrt::sqrt};
 
@@ -82,6 +84,21 @@ pub(crate) fn acceleration_prefix(joint: &Joint) -> Option<Prefix> {
 }
 
 impl Prefix {
+    /// What this does seen backwards in time ([`Joint::reversed`]): a suffix, and the velocity and
+    /// acceleration with which it begins.
+    pub(crate) fn reversed(&self) -> ([Phase; STEPS_MAX], [f64; 2]) {
+        let mut suffix = [Phase::default(); STEPS_MAX];
+        let [mut velocity, mut acceleration] = self.end;
+        let begin = [velocity, -acceleration];
+        for (step, phase) in self.steps.iter().rev().filter(|step| step.duration > 0.0).zip(&mut suffix) {
+            // Without a jerk limit the acceleration jumps: it is that of the step.
+            let held = if step.slope == 0 { step.acceleration } else { acceleration };
+            *phase = Phase { duration: step.duration, velocity, acceleration: -held, slope: step.slope };
+            (velocity, acceleration) = (step.velocity, step.acceleration);
+        }
+        (suffix, begin)
+    }
+
     fn none(joint: &Joint) -> Self {
         Prefix { steps: [Phase::default(); STEPS_MAX], end: joint.start }
     }

@@ -63,6 +63,13 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
+    /// The joint as it moves backwards in time, positions mirrored, so that velocities and jerks keep
+    /// their signs.
+    pub(crate) fn reversed(&self) -> Self {
+        let Joint { start, end, peak, top, bottom, rise, fall } = *self;
+        Joint { start: [end[0], -end[1]], end: [start[0], -start[1]], peak, top: bottom, bottom: top, rise, fall }
+    }
+
     /// The same joint with every sign turned; `peak` is its highest velocity then.
     pub(crate) fn mirrored(&self, peak: f64) -> Self {
         Joint {

@@ -46,7 +46,7 @@ pub enum Synchronization {
 pub struct Input<const N: usize> {
     /// State at the start. It may lie outside the limits; the trajectory then begins by braking.
     pub start: [State; N],
-    /// State at the end, within the limits.
+    /// State at the end, within the limits unless `target_outside`.
     pub target: [State; N],
     /// Limits of each joint.
     pub limits: [Limits; N],
@@ -61,6 +61,9 @@ pub struct Input<const N: usize> {
     /// Return to a velocity limit that the start exceeds without dipping below it: slower than the
     /// fastest return, and what one wants after lowering a limit in motion.
     pub soft_limits: [bool; N],
+    /// Take a target outside the limits, which is an error otherwise: the trajectory then ends by leaving
+    /// them, as late and as fast as a start outside them would have come back.
+    pub target_outside: [bool; N],
     /// The shortest duration wanted, in seconds; 0 for none.
     pub minimum_duration: f64,
     /// If above 0, durations are whole multiples of it, in seconds.
@@ -84,6 +87,7 @@ impl<const N: usize> Default for Input<N> {
             position_min: [f64::NEG_INFINITY; N],
             position_max: [f64::INFINITY; N],
             soft_limits: [false; N],
+            target_outside: [false; N],
             minimum_duration: 0.0,
             duration_step: 0.0,
             enabled: [true; N],
@@ -102,6 +106,7 @@ pub(crate) struct JointInput {
     pub(crate) limits: Limits,
     pub(crate) tolerance: f64,
     pub(crate) soft: bool,
+    pub(crate) target_outside: bool,
 }
 
 impl<const N: usize> Input<N> {
@@ -113,6 +118,7 @@ impl<const N: usize> Input<N> {
             limits: self.limits[index],
             tolerance: self.tolerance[index].max(0.0),
             soft: self.soft_limits[index],
+            target_outside: self.target_outside[index],
         }
     }
 }
@@ -142,6 +148,9 @@ pub(crate) fn check(index: usize, input: &JointInput) -> Result<Joint, Error> {
     };
     if !joint.rise.is_finite() || !joint.fall.is_finite() {
         return Err(Error::OutOfRange { joint: index });
+    }
+    if input.target_outside {
+        return Ok(joint);
     }
     let (v, a) = (target.velocity, target.acceleration);
     let over = |value: f64, limit: f64| value - limit > TIE * (value.abs() + limit.abs());

@@ -82,10 +82,10 @@ impl Swing {
         Swing { start: a0, end: af, gain: vf - v0, top, bottom, rise, fall }
     }
 
-    /// The joint whose velocity problem this is, from another start; its velocity is not limited.
-    pub(crate) fn joint(&self, start: [f64; 2]) -> Joint {
-        let Swing { end, gain, top, bottom, rise, fall, .. } = *self;
-        Joint { start, end: [start[0] + gain, end], peak: f64::INFINITY, top, bottom, rise, fall }
+    /// A joint whose velocity problem this is; its velocity is not limited.
+    pub(crate) fn joint(&self) -> Joint {
+        let Swing { start, end, gain, top, bottom, rise, fall } = *self;
+        Joint { start: [0.0, start], end: [gain, end], peak: f64::INFINITY, top, bottom, rise, fall }
     }
 
     /// The possible durations of this swing. `velocity_scale` is the size of the velocities whose
@@ -160,13 +160,13 @@ impl Swing {
         let rest = (time - tip_time).max(0.0);
         let (high, low) = (start.max(end), start.min(end));
         let plateau = if rise + fall == 0.0 {
-            if time > 0.0 { (gain / time).clamp(-bottom, top) } else { 0.0 }
+            if time > 0.0 { (gain / time).max(-bottom).min(top) } else { 0.0 }
         } else if gain > tip_gain + high * rest {
             above(high, gain - tip_gain - high * rest, rest, (rise + fall) / 2.0).min(top)
         } else if gain < tip_gain + low * rest {
             -above(-low, tip_gain + low * rest - gain, rest, (rise + fall) / 2.0).min(bottom)
         } else if rest > 0.0 {
-            ((gain - tip_gain) / rest).clamp(low, high)
+            ((gain - tip_gain) / rest).max(low).min(high)
         } else {
             start
         };

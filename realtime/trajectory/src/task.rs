@@ -27,6 +27,8 @@ pub(crate) struct Task {
     goal: Goal,
     /// How long the prefix takes that brings the start inside the limits; 0 if it lies there.
     begin: f64,
+    /// How long the suffix takes that leads to a target outside the limits; 0 if it lies inside.
+    tail: f64,
     /// Duration of the motion without a prefix, if that is just one jerk, else negative: on the way to a
     /// target about to leave the limits, the start is about to, too.
     direct: f64,
@@ -55,6 +57,18 @@ impl Task {
             (begin, position) = (writer.now(), writer.position);
             joint.start = prefix.end;
         }
+        let mut tail = 0.0;
+        if input.target_outside
+            && let Some(prefix) = prefix(&joint.reversed(), input)
+        {
+            let (suffix, end) = prefix.reversed();
+            let mut scratch = Profile::EMPTY;
+            let mut writer = Writer::new(&mut scratch, &input.limits, 0.0, f64::INFINITY);
+            writer.prefix(&suffix);
+            (tail, joint.end) = (writer.now(), end);
+            position += writer.position;
+            direct = -1.0;
+        }
         let goal = match input.interface {
             Interface::Position => Goal::Position(reach(joint, input, position)),
             Interface::Velocity => {
@@ -62,7 +76,7 @@ impl Task {
                 Goal::Velocity(swing, swing.durations(joint.start[0].abs() + joint.end[0].abs()))
             }
         };
-        Task { goal, begin, direct }
+        Task { goal, begin, tail, direct }
     }
 
     /// The first possible duration not below `time`; `time` itself unchanged if it is possible. `None` if
@@ -71,12 +85,13 @@ impl Task {
         if self.goes_direct(time) {
             return Some(time.max(self.direct));
         }
-        let passed = (time - self.begin).max(0.0);
+        let around = self.begin + self.tail;
+        let passed = (time - around).max(0.0);
         let found = match &mut self.goal {
             Goal::Position(reach) => reach.next(passed)?,
             Goal::Velocity(_, durations) => durations.next(passed),
         };
-        Some(if found <= passed { time.max(self.begin) } else { self.begin + found })
+        Some(if found <= passed { time.max(around) } else { around + found })
     }
 
     /// Whether there is a motion without a prefix that takes no less than `time`.
@@ -84,13 +99,14 @@ impl Task {
         time <= self.direct * (1.0 + DIRECT_TIE)
     }
 
-    /// The problem from the start itself.
+    /// The problem from the start itself to the target itself.
     fn joint(&self, input: &JointInput) -> Joint {
-        let start = [input.start.velocity, input.start.acceleration];
-        match &self.goal {
-            Goal::Position(reach) => Joint { start, ..*reach.joint() },
-            Goal::Velocity(swing, _) => swing.joint(start),
-        }
+        let ends = [input.start, input.target].map(|state| [state.velocity, state.acceleration]);
+        let joint = match &self.goal {
+            Goal::Position(reach) => *reach.joint(),
+            Goal::Velocity(swing, _) => swing.joint(),
+        };
+        Joint { start: ends[0], end: ends[1], ..joint }
     }
 
     /// Writes the motion that takes `duration`, which must be possible, to `profile`, which must be new;
@@ -107,10 +123,17 @@ impl Task {
                 velocity = prefix.end[0];
                 writer.prefix(&prefix.steps);
             }
-            let time = duration - self.begin;
+            let time = duration - self.begin - self.tail;
+            writer.end = duration - self.tail;
             match &mut self.goal {
                 Goal::Position(reach) => write_reach(reach, time, &mut writer),
                 Goal::Velocity(swing, _) => writer.follow(&swing.waiting(time, velocity)),
+            }
+            if self.tail > 0.0
+                && let Some(prefix) = prefix(&self.joint(input).reversed(), input)
+            {
+                writer.end = duration;
+                writer.follow(&prefix.reversed().0);
             }
         }
         // The positions are integrated forward, so this tells whether all that led here was sound.

@@ -19,6 +19,8 @@ pub(crate) struct Writer<'a> {
     pub(crate) position: f64,
     /// When the motion will end.
     duration: f64,
+    /// When what is appended next will end.
+    pub(crate) end: f64,
     /// The largest size of the positions that occur; not finite if some number is not.
     extent: f64,
 }
@@ -28,7 +30,7 @@ impl<'a> Writer<'a> {
     pub(crate) fn new(profile: &'a mut Profile, limits: &Limits, position: f64, duration: f64) -> Self {
         profile.set_jerks(limits, 1.0);
         let now = Instant::default();
-        Writer { profile, place: 0, codes: 0, limits: *limits, now, position, duration, extent: 0.0 }
+        Writer { profile, place: 0, codes: 0, limits: *limits, now, position, duration, end: duration, extent: 0.0 }
     }
 
     pub(crate) fn now(&self) -> f64 {
@@ -65,11 +67,11 @@ impl<'a> Writer<'a> {
         }
     }
 
-    /// Appends a motion that lasts from now to the end, or a rounding less or more.
+    /// Appends a motion that lasts from now to `end`, or a rounding less or more.
     pub(crate) fn follow(&mut self, phases: &[Phase]) {
         let alone = whole(&self.limits);
         let begin = self.now.time;
-        let starts = starts(phases, begin, self.duration - begin);
+        let starts = starts(phases, begin, self.end - begin);
         for (phase, until) in phases.iter().zip(&starts[1..]) {
             let slope = (phase.slope + 1).clamp(0, 2) as usize;
             let jerk = (alone.shares[slope], alone.codes[slope]);
@@ -82,7 +84,7 @@ impl<'a> Writer<'a> {
     pub(crate) fn mix(&mut self, [far, near]: [&Phases; 2], share: f64) {
         self.profile.set_jerks(&self.limits, share);
         let (begin, parts) = (self.now.time, self.profile.parts(&self.limits));
-        let walk = |phases, part| Walk::new(phases, begin, self.duration - begin, part);
+        let walk = |phases, part| Walk::new(phases, begin, self.end - begin, part);
         let (mut far, mut near) = (walk(far, parts[0]), walk(near, parts[1]));
         // Each pass ends a phase of one of the motions: 14 at most.
         while !(far.ended() && near.ended()) {

@@ -252,3 +252,40 @@ fn a_position_limit_is_never_passed() {
     }
     assert!(kept > 500 && refused > 500, "{kept} kept, {refused} refused");
 }
+
+/// A target outside the limits is refused unless asked for; then the way there is that of the motion
+/// backwards in time, whose start lies outside.
+#[test]
+fn a_target_outside_the_limits_is_reached_when_asked_for() {
+    let mut source = Source::new(Kind::Outside, 18);
+    let mut outside = 0;
+    for index in 0..3000 {
+        // The way back: a start outside the limits, which becomes the target.
+        let back = input::<1>(&mut source);
+        let turned = |state: State| State {
+            position: -state.position,
+            velocity: state.velocity,
+            acceleration: -state.acceleration,
+        };
+        let mut there = back;
+        (there.start[0], there.target[0]) = (turned(back.target[0]), turned(back.start[0]));
+        outside += u32::from(Trajectory::calculate(&there).is_err());
+        there.target_outside[0] = true;
+        let (there_and, back_again) =
+            (Trajectory::calculate(&there).expect("asked for"), Trajectory::calculate(&back).expect("valid"));
+        let (duration, other) = (there_and.duration(), back_again.duration());
+        assert!((duration - other).abs() <= 1e-9 * duration, "{index}: {duration} {other} {there:?}");
+        assert_eq!(there_and.at(duration), there.target);
+        let reach = 1.0 + duration * there.limits[0].velocity_max + there.target[0].velocity.abs() * duration;
+        for step in 0..=100 {
+            let time = duration * f64::from(step) / 100.0;
+            let ([on], [off]) = (there_and.at(time), back_again.at(duration - time));
+            let off = turned(off);
+            assert!(
+                (on.position - off.position).abs() <= 1e-10 * reach && (on.velocity - off.velocity).abs() <= 1e-7 * reach,
+                "{index}: {on:?} {off:?} {there:?}"
+            );
+        }
+    }
+    assert!(outside > 1000, "{outside}");
+}
