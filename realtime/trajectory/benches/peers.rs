@@ -17,6 +17,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             .arg(folder.join("../../../target/peers/trajectory"))
             .arg("--")
             .args(arguments)
+            // An incremental build is for editing, not for measuring.
+            .env("CARGO_PROFILE_RELEASE_INCREMENTAL", "false")
             .status()?;
         return if status.success() { Ok(()) } else { Err(format!("the peers ended with {status}").into()) };
     }

@@ -65,6 +65,22 @@ impl Error {
     }
 }
 
+impl Error {
+    /// The same of another joint.
+    pub(crate) fn of(self, joint: usize) -> Self {
+        match self {
+            Error::NotFinite { .. } => Error::NotFinite { joint },
+            Error::Limits { .. } => Error::Limits { joint },
+            Error::TargetVelocity { .. } => Error::TargetVelocity { joint },
+            Error::TargetAcceleration { .. } => Error::TargetAcceleration { joint },
+            Error::Unreachable { .. } => Error::Unreachable { joint },
+            Error::NotStraight { .. } => Error::NotStraight { joint },
+            Error::PositionLimit { .. } => Error::PositionLimit { joint },
+            Error::OutOfRange { .. } => Error::OutOfRange { joint },
+        }
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let reason = match self {

@@ -26,10 +26,10 @@ const TIE: f64 = 8.0 * f64::EPSILON;
 
 /// The same where the alternative is to turn the acceleration round first: roundings of a motion
 /// recomputed thousands of times from its own output.
-const LOOSE_TIE: f64 = 2048.0 * TIE;
+const LOOSE_TIE: f64 = 512.0 * TIE;
 
 /// Roundings of velocities up to the limit that a motion recomputed from its own output collects.
-const COLLECTED: f64 = 2048.0 * f64::EPSILON;
+const COLLECTED: f64 = 1024.0 * f64::EPSILON;
 
 /// The share of the last jerk's own work that its collected roundings may amount to.
 pub(crate) const ARRIVAL_SHARE: f64 = 1e-4;

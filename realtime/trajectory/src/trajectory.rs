@@ -34,7 +34,8 @@ pub struct Trajectory<const N: usize> {
 }
 
 impl<const N: usize> Trajectory<N> {
-    const EMPTY: Self = Trajectory { profiles: [Profile::EMPTY; N], duration: 0.0 };
+    /// Nothing written yet.
+    pub(crate) const EMPTY: Self = Trajectory { profiles: [Profile::EMPTY; N], duration: 0.0 };
 
     /// The fastest motion from start to target in which the joints keep their limits and share
     /// their durations as asked.

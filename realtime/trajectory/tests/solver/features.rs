@@ -282,7 +282,8 @@ fn a_target_outside_the_limits_is_reached_when_asked_for() {
             let ([on], [off]) = (there_and.at(time), back_again.at(duration - time));
             let off = turned(off);
             assert!(
-                (on.position - off.position).abs() <= 1e-10 * reach && (on.velocity - off.velocity).abs() <= 1e-7 * reach,
+                (on.position - off.position).abs() <= 1e-10 * reach
+                    && (on.velocity - off.velocity).abs() <= 1e-7 * reach,
                 "{index}: {on:?} {off:?} {there:?}"
             );
         }

@@ -7,6 +7,7 @@ mod closed_loop;
 mod exact;
 mod features;
 mod inputs;
+mod moving;
 mod oracle;
 mod raw;
 mod sweep;
