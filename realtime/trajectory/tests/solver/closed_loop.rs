@@ -1,6 +1,6 @@
 //! As a controller uses it: every cycle a new trajectory from the state the last one led to.
 
-use crate::inputs::{Kind, Problem, Source};
+use crate::inputs::{Kind, Problem, Source, campaign};
 use tandem_trajectory::{Input, State, Trajectory};
 
 /// How a closed loop went.
@@ -42,16 +42,17 @@ fn a_closed_loop_arrives_as_planned() {
     for kind in [Kind::Benchmark, Kind::Decimals(1), Kind::Asymmetric, Kind::Outside] {
         let mut source = Source::new(kind, 3);
         let (mut late, mut worst) = (0, 0.0_f64);
-        for index in 0..150 {
+        for index in 0..campaign(150) {
             let problem = source.problem();
             let Arrival { planned, arrived } = follow(&problem, 4e-3, 0.0, || 0.0);
             let drift = (arrived - planned).abs();
             worst = worst.max(drift);
-            late += u32::from(drift > 1e-6);
+            late += usize::from(drift > 1e-6);
             assert!(drift < 1e-3, "{kind:?} {index}: planned {planned} arrived {arrived} {problem:?}");
         }
-        println!("{kind:?}: {late} of 150 by more than 1e-6 s, worst drift {worst:.1e} s");
-        assert!(late <= 2, "{kind:?}: {late}");
+        let count = campaign(150);
+        println!("{kind:?}: {late} of {count} by more than 1e-6 s, worst drift {worst:.1e} s");
+        assert!(late * 75 <= count, "{kind:?}: {late}");
     }
 }
 
@@ -65,7 +66,7 @@ fn a_noisy_closed_loop_arrives_in_spite_of_it() {
     for size in [1e-12, 1e-9] {
         let (mut source, mut noise) = (Source::new(Kind::Benchmark, 4), Source::new(Kind::Noise, 5));
         let mut worst = 0.0_f64;
-        for index in 0..150 {
+        for index in 0..campaign(150) {
             let mut problem = source.problem();
             problem.target = State::at_rest(problem.target.position);
             let arrival = follow(&problem, cycle, 10.0 * size, || noise.uniform(-size, size));

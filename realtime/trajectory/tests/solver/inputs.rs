@@ -60,6 +60,13 @@ pub(crate) const KINDS: [Kind; 16] = [
     Kind::Outside,
 ];
 
+/// So many, times what the environment asks for: `TANDEM_CAMPAIGN=1000` makes every test of many inputs a
+/// thousand times as long.
+pub(crate) fn campaign(count: usize) -> usize {
+    let factor = std::env::var("TANDEM_CAMPAIGN").ok().and_then(|factor| factor.parse::<usize>().ok());
+    count * factor.unwrap_or(1)
+}
+
 /// A source of problems; the seed and the kind make it repeatable.
 pub(crate) struct Source {
     generator: ChaCha8Rng,

@@ -1,6 +1,6 @@
 //! Any bit pattern is an input: the answer is an error or a finite trajectory, never a panic.
 
-use crate::inputs::{Kind, Source};
+use crate::inputs::{Kind, Source, campaign};
 use tandem_trajectory::{Input, Interface, Limits, State, Synchronization, Trajectory};
 
 /// A double from bits, biased towards the troublemakers.
@@ -21,7 +21,7 @@ fn number(source: &mut Source) -> f64 {
 fn any_bit_pattern_gives_an_error_or_a_finite_trajectory() {
     let mut source = Source::new(Kind::Benchmark, 7);
     let (mut solved, mut refused) = (0, 0);
-    for index in 0..100_000 {
+    for index in 0..campaign(100_000) {
         let mut input = Input::<2>::default();
         for joint in 0..2 {
             let mut state = || State {

@@ -2,13 +2,13 @@
 
 use crate::{
     check::check,
-    inputs::{KINDS, Kind, Problem, Source},
+    inputs::{KINDS, Kind, Problem, Source, campaign},
 };
 use tandem_trajectory::{Input, Limits, State, Synchronization, Trajectory};
 
-/// Problems of each kind; the environment can ask for more.
+/// Problems of each kind.
 fn count() -> usize {
-    std::env::var("TANDEM_SWEEP").ok().and_then(|count| count.parse().ok()).unwrap_or(4_000)
+    campaign(4_000)
 }
 
 fn input<const N: usize>(kind: Kind, problems: &[Problem; N]) -> Input<N> {
