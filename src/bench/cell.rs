@@ -8,7 +8,7 @@ use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use hdrhistogram::Histogram;
 use rustix::process::{Pid, Signal, kill_process, set_parent_process_death_signal};
@@ -22,7 +22,7 @@ use super::BenchError;
 use super::series::histogram;
 use crate::live::{RunningCell, running_cells};
 
-/// A cell that says nothing for this long has failed.
+/// A cell that has not come so far by then has failed.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// More boxes than any bench waits for.
 const BOXES: &str = "1000";
@@ -107,14 +107,6 @@ impl LiveCell {
     pub(super) fn seat(&self) -> &Seat {
         &self.seat
     }
-
-    /// Waits for what the cell tells.
-    ///
-    /// # Errors
-    /// It ends, or says nothing for a long time.
-    pub(super) fn until(&self, what: &str, wanted: impl FnMut(&Value) -> bool) -> Result<Value, BenchError> {
-        until(&self.events, what, wanted)
-    }
 }
 
 impl Seat {
@@ -178,15 +170,13 @@ impl Drop for Starting {
 }
 
 fn until(events: &Receiver<Value>, what: &str, mut wanted: impl FnMut(&Value) -> bool) -> Result<Value, BenchError> {
+    let deadline = Instant::now() + PATIENCE;
     loop {
-        match events.recv_timeout(PATIENCE) {
+        match events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
             Ok(event) if wanted(&event) => return Ok(event),
             Ok(_) => {}
             Err(RecvTimeoutError::Timeout) => {
-                return Err(BenchError::peer(
-                    "the live cell",
-                    format!("no `{what}` within {PATIENCE:?} of the last event"),
-                ));
+                return Err(BenchError::peer("the live cell", format!("no `{what}` within {PATIENCE:?}")));
             }
             Err(RecvTimeoutError::Disconnected) => {
                 let hint = "run it by itself to see why: tandem run CELL.toml";
@@ -200,9 +190,16 @@ fn until(events: &Receiver<Value>, what: &str, mut wanted: impl FnMut(&Value) ->
 fn end(child: &mut Child, events: &Receiver<Value>) {
     let pid = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
     let asked = pid.is_some_and(|pid| kill_process(pid, Signal::TERM).is_ok());
-    // It closes its output when it has ended; one that says nothing more hangs.
-    while asked && events.recv_timeout(PATIENCE).is_ok() {}
-    if !matches!(events.recv_timeout(Duration::ZERO), Err(RecvTimeoutError::Disconnected)) {
+    // It closes its output when it has ended; one that does not hangs.
+    let deadline = Instant::now() + PATIENCE;
+    let ended = asked
+        && loop {
+            match events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(_) => {}
+                Err(silence) => break silence == RecvTimeoutError::Disconnected,
+            }
+        };
+    if !ended {
         let _ = child.kill();
     }
     let _ = child.wait();

@@ -22,7 +22,7 @@ use crate::roles::service;
 const PIDFD: &str = "death seen by a bare pidfd";
 const OBITUARY: &str = "death told by iceoryx2's event";
 const BRAKED: &str = "last good command to braking";
-const BACK: &str = "kill to the first command of the successor";
+const BACK: &str = "kill to the successor's first command in force";
 const RESPAWN: &str = "bare iceoryx2 respawn, and reading the cell's files";
 /// A successor that is not in command by then does not come.
 const PATIENCE: Duration = Duration::from_secs(10);
@@ -114,12 +114,13 @@ fn kill(file: &Path, seed: u64) -> Result<Kill, BenchError> {
             Some(PlantFault::CommandExpired) => braked = braked.or(Some(good.age_at(state.header.stamp))),
             _ => {}
         }
-        if command.read().header.epoch > killed_epoch && back.is_none() {
+        // In force, not only published: the brakes are open, and the state answers to a command of after the kill.
+        let successor = command.read().header.epoch > killed_epoch;
+        let in_force = state.fault.get() == Some(PlantFault::None) && state.command_stamp > killed;
+        if successor && in_force && back.is_none() {
             back = Some(killed.age_at(now));
         }
     }
-    // It has to come back in the end, not only to speak.
-    cell.until("recovered", |event| event["event"] == "recovered" && event["role"] == Role::Controller.name())?;
     let (Some(braked), Some(back)) = (braked, back) else { unreachable!("the loop ends with both") };
     Ok(Kill { seen, braked, back })
 }

@@ -57,7 +57,7 @@ fn the_benches_measure_a_live_cell_and_leave_nothing() {
             "recovery",
             [
                 "last good command to braking",
-                "kill to the first command of the successor",
+                "kill to the successor's first command in force",
                 "death told by iceoryx2's event",
             ],
         ),
