@@ -16,6 +16,7 @@ use crate::{
     covering::Tie,
     extremal::{Extremal, Joint, Shape},
     motion::Phases,
+    state::State,
     swing::{ARRIVAL_SHARE, Durations, Swing},
 };
 
@@ -75,7 +76,7 @@ impl Reach {
             let bend = (joint.end[1] - joint.start[1]).abs() * time * time;
             let run = (joint.start[0].abs() + joint.end[0].abs()) * time;
             let work = (ARRIVAL_SHARE * bend).max(ARRIVAL_RUN * run);
-            off.abs() <= tie.tight + ROUNDINGS * rounding + tie.loose.min(work)
+            off.abs() <= tie.tight + ROUNDINGS * rounding + (tie.loose - allowed).min(work)
         });
         let durations = swing.durations(velocities);
         let arrival = arrival.unwrap_or(-1.0);
@@ -93,9 +94,29 @@ impl Reach {
         self.near.get_or_insert_with(|| Extremal::new(joint.mirrored(velocity_max)))
     }
 
-    /// How long the rest takes, if one jerk does it up to roundings; else negative.
+    /// How long the rest takes if one jerk does it up to roundings, or else the fastest change of velocity,
+    /// on which the acceleration keeps its sign and so the velocity its limits; else negative.
     pub(crate) fn arrival(&self) -> f64 {
-        self.arrival
+        if self.arrival >= 0.0 {
+            return self.arrival;
+        }
+        let Joint { start: [velocity, before], end: [_, after], rise, fall, .. } = self.far.joint;
+        let jerks = [-1.0 / fall, 0.0, 1.0 / rise];
+        let time = self.durations.first;
+        let mut state = State { position: 0.0, velocity, acceleration: before };
+        for phase in Swing::of(&self.far.joint).waiting(time, velocity) {
+            if phase.acceleration * (before + after) < 0.0 {
+                return -1.0;
+            }
+            let jerk = jerks[(phase.slope + 1).clamp(0, 2) as usize];
+            state = State { velocity: phase.velocity, acceleration: phase.acceleration, ..state };
+            state = state.advanced(phase.duration, jerk);
+        }
+        let off = (self.distance - state.position).abs();
+        let run = (velocity.abs() + state.velocity.abs()) * time;
+        let rounding = self.rounding + self.far.distance_known(time).1;
+        let tie = ROUNDINGS * rounding + (Tie::new(rounding, 0.0).loose).min(ARRIVAL_RUN * run);
+        if before * after >= 0.0 && off <= tie + self.allowed { time } else { -1.0 }
     }
 
     /// Whether one jerk does the rest in no less than `time`.

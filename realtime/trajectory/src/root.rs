@@ -3,8 +3,8 @@
 /// Halvings that bring any bracket of doubles to neighbours, plus the steps between them.
 const STEPS_MAX: usize = 2200;
 
-/// A last step this small, relatively, whose square is below rounding, needs no look at where it led.
-const LAST_STEP: f64 = 7e-9;
+/// A last step this small, relatively, needs no look at where it led.
+const LAST_STEP: f64 = 1e-10;
 
 /// The root of a function with `f(low) < 0 < f(high)` and no other one, given with its first two
 /// derivatives and a first guess.

@@ -29,8 +29,8 @@ pub(crate) struct Task {
     begin: f64,
     /// How long the suffix takes that leads to a target outside the limits; 0 if it lies inside.
     tail: f64,
-    /// Duration of the motion without a prefix, if that is just one jerk, else negative: on the way to a
-    /// target about to leave the limits, the start is about to, too.
+    /// Duration of the motion without a prefix, if that is just the change of velocity, else negative: on
+    /// the way to a target about to leave the limits, the start is about to, too.
     direct: f64,
 }
 
@@ -114,7 +114,8 @@ impl Task {
     pub(crate) fn write(&mut self, input: &JointInput, duration: f64, profile: &mut Profile) -> bool {
         let mut writer = Writer::new(profile, &input.limits, input.start.position, duration);
         if self.goes_direct(duration) {
-            write_reach(&mut reach(self.joint(input), input, input.start.position), duration, &mut writer);
+            let swing = Swing::of(&self.joint(input));
+            writer.follow(&swing.waiting(duration, input.start.velocity));
         } else {
             let mut velocity = input.start.velocity;
             if self.begin > 0.0

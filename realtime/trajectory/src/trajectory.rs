@@ -290,7 +290,7 @@ impl<const N: usize> Input<N> {
 /// The smallest multiple of `step` that is not below `time`, up to rounding.
 fn multiple(time: f64, step: f64) -> f64 {
     let ratio = time / step;
-    if ratio >= 9.0e15 {
+    if ratio >= 9.0e15 || step == f64::INFINITY {
         return time;
     }
     let whole = ratio as u64;

@@ -108,9 +108,10 @@ impl<'a> Writer<'a> {
     /// Ends the motion in `state`; returns the size of the positions on the way, at least `least`, which is
     /// not finite if some number is not.
     pub(crate) fn finish(self, state: State, least: f64) -> f64 {
-        self.profile.set(self.place, self.now.read_as(self.duration), state);
+        let end = self.now.read_as(self.duration);
+        self.profile.set(self.place, end, state);
         self.profile.set_codes(self.codes, self.place);
-        larger(self.extent, least)
+        if end.time.is_finite() && end.rest.is_finite() { larger(self.extent, least) } else { f64::NAN }
     }
 }
 

@@ -4,7 +4,7 @@ use crate::inputs::{Kind, Source};
 use tandem_trajectory::{Input, Interface, Limits, State, Synchronization, Trajectory};
 
 /// What the trajectories below hash to, in every build and on every machine: change it with the solver.
-const DIGEST: u64 = 0x9c0e_9085_e744_bd4f;
+const DIGEST: u64 = 0x7a05_1dcd_9b5b_ac43;
 
 /// A problem of four joints from nothing but uniform numbers, so that the inputs are the same everywhere, too.
 fn input(source: &mut Source) -> Input<4> {

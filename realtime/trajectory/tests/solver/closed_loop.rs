@@ -97,3 +97,29 @@ fn an_idle_joint_stays() {
         assert!((input.start[0].position - 0.3).abs() < 1e-7, "{:?}", input.start[0]);
     }
 }
+
+/// In its last moments a motion to a target about to leave the limits is itself about to: it must not be
+/// braked then, which would take it round once more.
+#[test]
+fn a_motion_to_the_edge_of_the_limits_is_not_braked() {
+    let state = |position, velocity, acceleration| State { position, velocity, acceleration };
+    let problem = Problem {
+        start: state(-2.3557667524672965, 0.3173449063895113, 0.5857945354834249),
+        target: state(-0.9679396318101804, -0.8552238614433009, -0.918096818624193),
+        limits: tandem_trajectory::Limits::symmetric(1.2793842699565494, 1.1425122515211805, 0.9822844176244806),
+    };
+    let Arrival { planned, arrived } = follow(&problem, 4e-3, 0.0, || 0.0);
+    assert!((planned - arrived).abs() < 1e-6, "{planned} {arrived}");
+}
+
+/// A target that may be missed by a tolerance may be missed by no more, and is no error then.
+#[test]
+fn a_motion_that_ends_within_the_tolerance_is_sound() {
+    let mut input = Input::<1> { tolerance: [1e-11], ..Input::default() };
+    input.start[0] =
+        State { position: 0.0003726346952316704, velocity: -0.017393655415596256, acceleration: 0.19820326413800407 };
+    input.target[0] = State::at_rest(-0.0006449712985624286);
+    input.limits[0] = tandem_trajectory::Limits::symmetric(7.27137832088671, 1.6299459557666829, 1.1292776870960957);
+    let trajectory = Trajectory::calculate(&input).expect("valid");
+    assert_eq!(trajectory.at(trajectory.duration()), input.target);
+}
