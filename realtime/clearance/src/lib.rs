@@ -33,6 +33,7 @@ mod shapes;
 pub mod ssm;
 mod sweep;
 mod targets;
+mod track;
 
 pub use body::{ArmBody, BodyError, LINK_CAPSULES_MAX, LinkCapsule, SELF_PAIRS_MAX};
 pub use monitor::{Clearance, Monitor, Pairing, Separation};

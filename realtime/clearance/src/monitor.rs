@@ -12,6 +12,7 @@ use crate::obstacle::{CarriedPart, FAR, Obstacle, SceneFault};
 use crate::placed::{Placed, PlacedArm};
 use crate::shapes::Shapes;
 use crate::targets::{CHUNK, Targets};
+use crate::track::Recent;
 use crate::{ArmBody, BodyError, LINK_CAPSULES_MAX};
 
 /// Objects a task may allow the tool to touch.
@@ -98,6 +99,7 @@ pub struct Monitor {
     part: Option<CarriedPart>,
     part_valid: bool,
     touch: [u32; TOUCH_MAX],
+    pub(crate) recent: Recent,
 }
 
 impl Monitor {
@@ -115,6 +117,7 @@ impl Monitor {
             part: None,
             part_valid: true,
             touch: [0; TOUCH_MAX],
+            recent: Recent::NOTHING,
         }
     }
 
@@ -138,6 +141,7 @@ impl Monitor {
     /// # Errors
     /// The first fault found. The scene is then invalid: clearance is −∞ until one is accepted.
     pub fn set_scene(&mut self, objects: &[SceneObject]) -> Result<(), SceneFault> {
+        self.recent = Recent::NOTHING;
         self.scene_valid = false;
         self.scene.clear();
         if objects.len() > SCENE_OBJECTS_MAX {
@@ -174,6 +178,7 @@ impl Monitor {
     /// Replaces the carried part; `None`, or one with `present == 0`, is nothing. A part whose numbers
     /// cannot be makes every distance −∞ until a good one is given.
     pub fn set_attached(&mut self, part: Option<&AttachedPart>) {
+        self.recent = Recent::NOTHING;
         let part = part.filter(|part| part.present != 0);
         self.part = part.and_then(|part| CarriedPart::of(part, self.shapes.as_deref()));
         self.part_valid = part.is_none() || self.part.is_some();
@@ -182,6 +187,7 @@ impl Monitor {
     /// Replaces the objects that tool and carried part may touch; 0 is no object. Those past the eighth
     /// are not allowed.
     pub fn set_touch(&mut self, ids: &[u32]) {
+        self.recent = Recent::NOTHING;
         self.touch = [0; TOUCH_MAX];
         let allowed = ids.iter().filter(|id| **id != 0);
         for (slot, id) in self.touch.iter_mut().zip(allowed) {
@@ -192,15 +198,19 @@ impl Monitor {
     /// The smallest distance to the scene and to the arm itself. The base (link 0) is checked against
     /// the other links only. Of pairs equally near that of the lowest link and object is named.
     pub fn clearance(&self, poses: &LinkPoses) -> Clearance {
-        match self.place(poses) {
-            Some(arm) if self.scene_valid => self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY),
-            _ => contact(),
+        let mut arm = self.unplaced(poses);
+        if !arm.place() || !self.is_sound() {
+            return contact();
         }
+        self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY)
     }
 
     /// [`Monitor::clearance`] and [`Monitor::separation`] at once, which is quicker than one after the other.
     pub fn measure(&self, poses: &LinkPoses) -> (Clearance, Separation) {
-        let Some(arm) = self.place(poses) else { return (contact(), lost()) };
+        let mut arm = self.unplaced(poses);
+        if !arm.place() || !self.part_valid {
+            return (contact(), lost());
+        }
         let clearance = if self.scene_valid { self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY) } else { contact() };
         (clearance, if self.people_valid { self.nearest_person(&arm) } else { lost() })
     }
@@ -208,23 +218,29 @@ impl Monitor {
     /// Whether scene and arm itself are more than `margin` metres away. People are not looked at.
     /// Quicker than [`Monitor::clearance`], as it stops at the first pair that is too near.
     pub fn is_clear(&self, poses: &LinkPoses, margin: f64) -> bool {
-        match self.place(poses) {
-            Some(arm) if self.scene_valid && margin.is_finite() => {
-                self.nearest(&arm, margin.next_up(), margin).distance > margin
-            }
-            _ => false,
-        }
+        let mut arm = self.unplaced(poses);
+        arm.place()
+            && self.is_sound()
+            && margin.is_finite()
+            && self.nearest(&arm, margin.next_up(), margin).distance > margin
     }
 
     /// The smallest distance to a person.
     pub fn separation(&self, poses: &LinkPoses) -> Separation {
-        self.place_for_people(poses).map_or_else(lost, |arm| self.nearest_person(&arm))
+        let mut arm = self.unplaced(poses);
+        if !arm.place() || !self.part_valid || !self.people_valid {
+            return lost();
+        }
+        self.nearest_person(&arm)
     }
 
     /// The smallest distance to each capsule of the person, in their order, for a separation by body
     /// part: the first [`Monitor::human_count`] entries. When a number was not finite, all are −∞.
     pub fn separations(&self, poses: &LinkPoses) -> [Separation; HUMAN_CAPSULES_MAX] {
-        let Some(arm) = self.place_for_people(poses) else { return [lost(); HUMAN_CAPSULES_MAX] };
+        let mut arm = self.unplaced(poses);
+        if !arm.place() || !self.part_valid || !self.people_valid {
+            return [lost(); HUMAN_CAPSULES_MAX];
+        }
         let mut all = [Separation::NOBODY; HUMAN_CAPSULES_MAX];
         for (index, (person, slot)) in self.people.all().iter().zip(&mut all).enumerate() {
             let mut best = nothing();
@@ -295,19 +311,6 @@ impl Monitor {
         self.touch.contains(&id)
     }
 
-    /// The arm at these poses, or `None` when a number is not finite or absurd.
-    fn place<'a>(&'a self, poses: &'a LinkPoses) -> Option<PlacedArm<'a>> {
-        if !self.part_valid {
-            return None;
-        }
-        let mut arm = self.unplaced(poses);
-        arm.place().then_some(arm)
-    }
-
-    fn place_for_people<'a>(&'a self, poses: &'a LinkPoses) -> Option<PlacedArm<'a>> {
-        if self.people_valid { self.place(poses) } else { None }
-    }
-
     /// The nearest of all pairs that are nearer than `limit`; stops early once below `enough`.
     fn nearest(&self, arm: &PlacedArm, limit: f64, enough: f64) -> Clearance {
         let mut best = Clearance { distance: limit, ..nothing() };
@@ -318,7 +321,7 @@ impl Monitor {
         best
     }
 
-    fn arm_to_itself(&self, arm: &PlacedArm, enough: f64, best: &mut Clearance) {
+    pub(crate) fn arm_to_itself(&self, arm: &PlacedArm, enough: f64, best: &mut Clearance) {
         let bodies = arm.bodies();
         for [a, b] in self.body.self_pairs() {
             check_own(arm, &bodies[a], &bodies[b], enough, best);
@@ -420,7 +423,7 @@ fn may_be_nearer(squared_gap: f64, reach: f64) -> bool {
 }
 
 #[inline]
-fn check(arm: &PlacedArm, body: &Placed, obstacle: &Obstacle, enough: f64, best: &mut Clearance) {
+pub(crate) fn check(arm: &PlacedArm, body: &Placed, obstacle: &Obstacle, enough: f64, best: &mut Clearance) {
     let wanted = Wanted { limit: best.distance, enough };
     if let Some(near) = arm.near(body, obstacle, wanted) {
         keep(best, &near, body.link, obstacle.id);
@@ -460,11 +463,11 @@ fn keep(best: &mut Clearance, near: &Near, link: usize, object: u32) {
     }
 }
 
-fn nothing() -> Clearance {
+pub(crate) fn nothing() -> Clearance {
     Clearance { distance: f64::INFINITY, link: 0, object: 0, point_on_arm: [0.0; 3], point_on_other: [0.0; 3] }
 }
 
-fn contact() -> Clearance {
+pub(crate) fn contact() -> Clearance {
     Clearance { distance: f64::NEG_INFINITY, ..nothing() }
 }
 

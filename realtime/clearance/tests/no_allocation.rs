@@ -136,9 +136,11 @@ proptest! {
             let clear = monitor.is_clear(&poses, margin);
             let path = monitor.path_is_clear(&chain, &position, &other, margin, 0.01);
             let clearance = monitor.clearance(&poses);
+            let tracked = [monitor.track(&poses), monitor.track(&poses), monitor.measure(&poses).0];
             let separation = monitor.separation(&poses);
             let each = monitor.separations(&poses);
             core::hint::black_box((lost, solved, clear, path));
+            assert!(tracked == [clearance; 3]);
             (clearance.distance, separation.distance, each[0].distance, clear)
         });
         prop_assert!(calls.is_none(), "{calls:?}");

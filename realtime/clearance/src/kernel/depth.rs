@@ -40,9 +40,9 @@ impl Shallowest {
     }
 }
 
-/// Nearest points of two cores that overlap, with minus a depth that is at least the true one.
-/// `corners` are those of the difference that hold the origin, as far as they are known.
-pub(super) fn of_overlap(first: &Core, second: &Core, corners: &[Corner]) -> Near {
+/// Nearest points of two cores that overlap, with minus a depth that is at least the true one, or `None` when
+/// that is above `limit`. `corners` are those of the difference that hold the origin, as far as they are known.
+pub(super) fn of_overlap(first: &Core, second: &Core, corners: &[Corner], limit: f64) -> Option<Near> {
     let mut best = Shallowest { depth: f64::INFINITY, normal: Vector3::x(), corner: Vector3::zeros() };
     for axis in 0..3 {
         let mut normal = Vector3::zeros();
@@ -59,12 +59,15 @@ pub(super) fn of_overlap(first: &Core, second: &Core, corners: &[Corner]) -> Nea
             best.look(first, second, -normal);
         }
     }
+    if -best.depth > limit {
+        return None;
+    }
     if let Some(mut polytope) = Polytope::around(first, second, corners) {
         polytope.grow(first, second, &mut best);
     }
     let depth = best.depth.max(0.0);
     // The first leaves against the outward normal; the corner reaches deepest that way.
-    Near { distance: -depth, on_first: best.corner, on_second: best.corner - best.normal * depth }
+    Some(Near { distance: -depth, on_first: best.corner, on_second: best.corner - best.normal * depth })
 }
 
 #[derive(Clone, Copy)]

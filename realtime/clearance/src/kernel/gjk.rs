@@ -58,7 +58,7 @@ pub(super) fn core_to_core(first: &Core, second: &Core, towards: Vector3<f64>, w
             if wanted.enough >= 0.0 {
                 return Some(Near { distance: 0.0, on_first, on_second });
             }
-            return Some(depth::of_overlap(first, second, simplex.corners()));
+            return depth::of_overlap(first, second, simplex.corners(), wanted.limit);
         };
         let length = nearest.norm();
         if length >= found {

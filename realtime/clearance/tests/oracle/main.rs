@@ -184,3 +184,36 @@ fn a_sweep_says_what_samples_say() {
         assert!(clear > 60 && blocked > 60, "{name}: {clear} clear, {blocked} not");
     }
 }
+
+/// Along motions between the reference positions, in steps from a cycle's to wild ones, with scenes, permissions and parts
+/// changing on the way: the query that remembers says what the one that looks at everything says, to the last bit.
+#[test]
+fn what_is_remembered_changes_no_answer() {
+    let part = AttachedPart { present: 1, half_extents: [0.08, 0.03, 0.05], ..AttachedPart::default() };
+    for robot in robots() {
+        for links in [Links::Capsules, Links::Hulls] {
+            let cases = cases(&robot, links);
+            let mut monitor = robot.monitor_in(&cases[0].scene, links, true);
+            for (index, pair) in cases.windows(2).enumerate() {
+                let [from, to] = [pair[0].position, pair[1].position];
+                if index % 5 == 0 {
+                    monitor.set_scene(&robot.scene(&pair[0].scene).0).expect("a reference scene is sound");
+                }
+                monitor.set_attached((index % 3 == 1).then_some(&part));
+                for step in 0..40 {
+                    if step == 20 && index % 2 == 0 {
+                        monitor.set_touch(&[index as u32 % 7, 1]);
+                    }
+                    // Mostly a millimetre or so, now and then far.
+                    let at = if step % 13 == 12 { 0.02 * f64::from(step) } else { 2e-4 * f64::from(step) };
+                    let position: [f64; JOINTS_MAX] = std::array::from_fn(|k| from[k] + at * (to[k] - from[k]));
+                    let poses = robot.chain.forward(&position);
+                    let all = monitor.clearance(&poses);
+                    assert_eq!(monitor.track(&poses), all, "{}, step {step}", pair[0].name);
+                }
+                let lost = robot.chain.forward(&[f64::NAN; JOINTS_MAX]);
+                assert_eq!(monitor.track(&lost).distance, f64::NEG_INFINITY);
+            }
+        }
+    }
+}
