@@ -215,7 +215,7 @@ fn main() {
     for robot in robots() {
         let cases = rows(&format!("{}_distance.csv", robot.name));
         let positions: Vec<_> = cases.iter().map(|row| robot.position(&row[3..])).collect();
-        let positions = &positions[..if bench.is_brief() { 10 } else { positions.len() }];
+        let positions = &positions[..if bench.is_brief() { 100 } else { positions.len() }];
         let sized = |id: &str| {
             let (objects, person) = robot.scene(id);
             objects.len() + person.len() == 50
@@ -277,6 +277,20 @@ fn measure(
         let case = format!("{}, 50 obstacles, {name}, {place} ({}): least distance", robot.name, positions.len());
         bench.compare(&case, "us", contenders);
     }
+
+    // A cycle apart: every joint at up to 0.5 rad/s, the same monitor with what it remembers and without.
+    let step = |from: &[f64; JOINTS_MAX], k: u32| -> [f64; JOINTS_MAX] {
+        std::array::from_fn(|joint| from[joint] + 5e-4 * f64::from(k) * (1.7 * joint as f64).cos())
+    };
+    let followed: Vec<_> = free.iter().take(30).flat_map(|from| (0..50).map(|k| step(from, k))).collect();
+    let tracking = RefCell::new(monitor.clone());
+    let contenders = vec![
+        Contender::new("ours", || each(&followed, |position| tracking.borrow_mut().track(&chain.forward(position)))),
+        Contender::new("ours, not remembering", || {
+            each(&followed, |position| monitor.clearance(&chain.forward(position)))
+        }),
+    ];
+    bench.compare(&format!("{}, 40 obstacles, {name}: a millisecond on", robot.name), "us", contenders);
 
     // The person is an obstacle like any other here.
     let mut whole = robot.monitor(links, true);

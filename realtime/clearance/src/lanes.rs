@@ -1,14 +1,21 @@
 //! Loops over plain arrays, compiled for the widest vectors that may be used.
 
-/// Does `work` with AVX2 where the processor has it. The compiler makes vector code of both, and as
+/// A loop for [`wide`]. Mark `run` with `#[inline(always)]`: only what is compiled into the caller is
+/// compiled for its vectors.
+pub(crate) trait Wide {
+    type Output;
+    fn run(self) -> Self::Output;
+}
+
+/// Runs a loop with AVX2 where the processor has it. The compiler makes vector code of both, and as
 /// neither fuses or reorders, the answers are the same to the last bit.
 #[inline]
-pub(crate) fn wide<R>(work: impl FnOnce() -> R) -> R {
+pub(crate) fn wide<W: Wide>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     {
         #[target_feature(enable = "avx2")]
-        fn with_avx2<R>(work: impl FnOnce() -> R) -> R {
-            work()
+        fn with_avx2<W: Wide>(work: W) -> W::Output {
+            work.run()
         }
         if std::arch::is_x86_feature_detected!("avx2") {
             #[allow(unsafe_code, reason = "the call of a function that needs a feature of the processor")]
@@ -16,5 +23,5 @@ pub(crate) fn wide<R>(work: impl FnOnce() -> R) -> R {
             return unsafe { with_avx2(work) };
         }
     }
-    work()
+    work.run()
 }

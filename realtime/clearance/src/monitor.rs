@@ -88,17 +88,17 @@ impl Pairing {
 /// Every method but [`Monitor::with_shapes`] is bounded by the array sizes; none allocates, blocks or panics.
 #[derive(Clone, Debug)]
 pub struct Monitor {
-    body: ArmBody,
+    pub(crate) body: ArmBody,
     #[allow(clippy::disallowed_types, reason = "cloned while starting, and freed at the end")]
-    shapes: Option<Arc<Shapes>>,
-    scene: Targets<SCENE_OBJECTS_MAX>,
+    pub(crate) shapes: Option<Arc<Shapes>>,
+    pub(crate) scene: Targets<SCENE_OBJECTS_MAX>,
     scene_valid: bool,
     people: Targets<HUMAN_CAPSULES_MAX>,
     velocities: [[f64; 3]; HUMAN_CAPSULES_MAX],
     people_valid: bool,
-    part: Option<CarriedPart>,
+    pub(crate) part: Option<CarriedPart>,
     part_valid: bool,
-    touch: [u32; TOUCH_MAX],
+    pub(crate) touch: [u32; TOUCH_MAX],
     pub(crate) recent: Recent,
 }
 
@@ -117,7 +117,7 @@ impl Monitor {
             part: None,
             part_valid: true,
             touch: [0; TOUCH_MAX],
-            recent: Recent::NOTHING,
+            recent: Recent::nothing(),
         }
     }
 
@@ -141,7 +141,7 @@ impl Monitor {
     /// # Errors
     /// The first fault found. The scene is then invalid: clearance is −∞ until one is accepted.
     pub fn set_scene(&mut self, objects: &[SceneObject]) -> Result<(), SceneFault> {
-        self.recent = Recent::NOTHING;
+        self.recent.forget();
         self.scene_valid = false;
         self.scene.clear();
         if objects.len() > SCENE_OBJECTS_MAX {
@@ -178,7 +178,7 @@ impl Monitor {
     /// Replaces the carried part; `None`, or one with `present == 0`, is nothing. A part whose numbers
     /// cannot be makes every distance −∞ until a good one is given.
     pub fn set_attached(&mut self, part: Option<&AttachedPart>) {
-        self.recent = Recent::NOTHING;
+        self.recent.forget();
         let part = part.filter(|part| part.present != 0);
         self.part = part.and_then(|part| CarriedPart::of(part, self.shapes.as_deref()));
         self.part_valid = part.is_none() || self.part.is_some();
@@ -187,7 +187,7 @@ impl Monitor {
     /// Replaces the objects that tool and carried part may touch; 0 is no object. Those past the eighth
     /// are not allowed.
     pub fn set_touch(&mut self, ids: &[u32]) {
-        self.recent = Recent::NOTHING;
+        self.recent.forget();
         self.touch = [0; TOUCH_MAX];
         let allowed = ids.iter().filter(|id| **id != 0);
         for (slot, id) in self.touch.iter_mut().zip(allowed) {
@@ -260,7 +260,10 @@ impl Monitor {
     /// never more than the smallest of their distances, +∞ when there is none. −∞, and no call, when a
     /// number was not finite.
     pub fn pairs(&self, poses: &LinkPoses, beyond: f64, mut visit: impl FnMut(&Pairing)) -> f64 {
-        let Some(arm) = self.place_for_people(poses) else { return f64::NEG_INFINITY };
+        let mut arm = self.unplaced(poses);
+        if !arm.place() || !self.part_valid || !self.people_valid {
+            return f64::NEG_INFINITY;
+        }
         let mut rest = f64::INFINITY;
         let wanted = Wanted { limit: beyond, enough: f64::NEG_INFINITY };
         for body in arm.bodies().iter().filter(|body| body.link != 0) {
@@ -321,17 +324,28 @@ impl Monitor {
         best
     }
 
-    pub(crate) fn arm_to_itself(&self, arm: &PlacedArm, enough: f64, best: &mut Clearance) {
+    fn arm_to_itself(&self, arm: &PlacedArm, enough: f64, best: &mut Clearance) {
         let bodies = arm.bodies();
         for [a, b] in self.body.self_pairs() {
             check_own(arm, &bodies[a], &bodies[b], enough, best);
         }
-        // The part against the links it does not hang on.
-        if let Some(part) = arm.part() {
-            for body in bodies.iter().filter(|body| body.link < part.link) {
-                check_own(arm, part, body, enough, best);
+        part_to_arm(arm, enough, best);
+    }
+
+    /// Distance of two links, whether the pair is to be checked or not.
+    pub(crate) fn link_distance(&self, poses: &LinkPoses, links: [usize; 2]) -> f64 {
+        let mut arm = self.unplaced(poses);
+        if !arm.place() {
+            return f64::NEG_INFINITY;
+        }
+        let mut best = nothing();
+        let of = |link: usize| arm.bodies().iter().filter(move |body| body.link == link && !body.is_part());
+        for first in of(links[0]) {
+            for second in of(links[1]) {
+                check_own(&arm, first, second, f64::NEG_INFINITY, &mut best);
             }
         }
+        best.distance
     }
 
     fn nearest_person(&self, arm: &PlacedArm) -> Separation {
@@ -358,6 +372,15 @@ impl Monitor {
             direction: direction.unwrap_or_else(Vector3::zeros).into(),
             human_velocity: self.velocities[capsule],
             point_on_arm: best.point_on_arm,
+        }
+    }
+}
+
+/// The part against the links it does not hang on.
+pub(crate) fn part_to_arm(arm: &PlacedArm, enough: f64, best: &mut Clearance) {
+    if let Some(part) = arm.part() {
+        for body in arm.bodies().iter().filter(|body| body.link < part.link) {
+            check_own(arm, part, body, enough, best);
         }
     }
 }
@@ -423,7 +446,7 @@ fn may_be_nearer(squared_gap: f64, reach: f64) -> bool {
 }
 
 #[inline]
-pub(crate) fn check(arm: &PlacedArm, body: &Placed, obstacle: &Obstacle, enough: f64, best: &mut Clearance) {
+fn check(arm: &PlacedArm, body: &Placed, obstacle: &Obstacle, enough: f64, best: &mut Clearance) {
     let wanted = Wanted { limit: best.distance, enough };
     if let Some(near) = arm.near(body, obstacle, wanted) {
         keep(best, &near, body.link, obstacle.id);
@@ -438,16 +461,20 @@ fn check_own(arm: &PlacedArm, first: &Placed, second: &Placed, enough: f64, best
     }
     let wanted = Wanted { limit: best.distance, enough };
     if let Some(near) = arm.near_each_other(first, second, wanted) {
-        if second.link >= first.link {
-            keep(best, &near.swapped(), second.link, 0);
-        } else {
-            keep(best, &near, first.link, 0);
-        }
+        keep_own(best, &near, first, second);
+    }
+}
+
+pub(crate) fn keep_own(best: &mut Clearance, near: &Near, first: &Placed, second: &Placed) {
+    if second.link >= first.link {
+        keep(best, &near.swapped(), second.link, 0);
+    } else {
+        keep(best, near, first.link, 0);
     }
 }
 
 #[inline]
-fn keep(best: &mut Clearance, near: &Near, link: usize, object: u32) {
+pub(crate) fn keep(best: &mut Clearance, near: &Near, link: usize, object: u32) {
     // Whatever the order they are looked at in, of pairs equally near the same is named.
     let nearer =
         near.distance < best.distance || near.distance == best.distance && (link, object) < (best.link, best.object);

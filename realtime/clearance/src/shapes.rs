@@ -8,7 +8,7 @@ use core::fmt;
 
 use nalgebra::Vector3;
 
-use crate::lanes::wide;
+use crate::lanes::{Wide, wide};
 use crate::mesh::Mesh;
 use crate::obstacle::FAR;
 
@@ -89,21 +89,8 @@ impl Hull {
 
     /// A point that lies farthest along `direction`: all are looked at, so no point of the hull lies farther.
     pub(crate) fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
-        let [x, y, z] = [direction.x, direction.y, direction.z];
         let blocks = &self.blocks[..];
-        let (farthest, places) = wide(move || {
-            let mut farthest = [f64::NEG_INFINITY; LANES];
-            let mut places = [0_usize; LANES];
-            for (place, [xs, ys, zs]) in blocks.iter().enumerate() {
-                for lane in 0..LANES {
-                    let along = xs[lane] * x + ys[lane] * y + zs[lane] * z;
-                    let farther = along > farthest[lane];
-                    farthest[lane] = if farther { along } else { farthest[lane] };
-                    places[lane] = if farther { place } else { places[lane] };
-                }
-            }
-            (farthest, places)
-        });
+        let (farthest, places) = wide(Farthest { blocks, direction: [direction.x, direction.y, direction.z] });
         let mut lane = 0;
         for other in 1..LANES {
             if farthest[other] > farthest[lane] {
@@ -121,6 +108,32 @@ impl Hull {
             (0..LANES).map(move |lane| Vector3::new(xs[lane], ys[lane], zs[lane]))
         };
         self.blocks.iter().flat_map(of_block).map(|point| point + self.centre)
+    }
+}
+
+/// The farthest point along a direction in each lane: how far, and its block.
+struct Farthest<'a> {
+    blocks: &'a [[[f64; LANES]; 3]],
+    direction: [f64; 3],
+}
+
+impl Wide for Farthest<'_> {
+    type Output = ([f64; LANES], [usize; LANES]);
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let [x, y, z] = self.direction;
+        let mut farthest = [f64::NEG_INFINITY; LANES];
+        let mut places = [0_usize; LANES];
+        for (place, [xs, ys, zs]) in self.blocks.iter().enumerate() {
+            for lane in 0..LANES {
+                let along = xs[lane] * x + ys[lane] * y + zs[lane] * z;
+                let farther = along > farthest[lane];
+                farthest[lane] = if farther { along } else { farthest[lane] };
+                places[lane] = if farther { place } else { places[lane] };
+            }
+        }
+        (farthest, places)
     }
 }
 

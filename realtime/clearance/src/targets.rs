@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use crate::lanes::wide;
+use crate::lanes::{Wide, wide};
 use crate::obstacle::Obstacle;
 
 /// Obstacles whose boxes are looked at in one go.
@@ -71,39 +71,13 @@ impl<const N: usize> Targets<N> {
     /// Squared distances from a box along the base axes to the box around each obstacle's core.
     #[inline]
     pub(crate) fn squared_gaps(&self, centre: &Vector3<f64>, half: &Vector3<f64>) -> [f64; N] {
-        let (centre, half) = ([centre.x, centre.y, centre.z], [half.x, half.y, half.z]);
-        wide(move || self.gaps(&centre, &half))
+        wide(Gaps::of(self, centre, half))
     }
 
     /// The least of [`Targets::squared_gaps`].
     #[inline]
     pub(crate) fn squared_gap_min(&self, centre: &Vector3<f64>, half: &Vector3<f64>) -> f64 {
-        let (centre, half) = ([centre.x, centre.y, centre.z], [half.x, half.y, half.z]);
-        wide(move || {
-            let gaps = self.gaps(&centre, &half);
-            let mut least = [f64::INFINITY; CHUNK];
-            for chunk in gaps.chunks_exact(CHUNK) {
-                for (least, gap) in least.iter_mut().zip(chunk) {
-                    *least = if *gap < *least { *gap } else { *least };
-                }
-            }
-            least.iter().fold(f64::INFINITY, |least, gap| if *gap < least { *gap } else { least })
-        })
-    }
-
-    #[inline(always)]
-    fn gaps(&self, centre: &[f64; 3], half: &[f64; 3]) -> [f64; N] {
-        const { assert!(N.is_multiple_of(CHUNK)) };
-        let mut gaps = [0.0; N];
-        for axis in 0..3 {
-            for (index, gap) in gaps.iter_mut().enumerate() {
-                let apart = (self.centre[axis][index] - centre[axis]).abs();
-                let apart = apart - (self.half[axis][index] + half[axis]);
-                let apart = if apart > 0.0 { apart } else { 0.0 };
-                *gap += apart * apart;
-            }
-        }
-        gaps
+        wide(LeastGap(Gaps::of(self, centre, half)))
     }
 
     /// Squared distance from a box along the base axes to the box around one obstacle's core.
@@ -113,5 +87,55 @@ impl<const N: usize> Targets<N> {
             let apart = apart.max(0.0);
             sum + apart * apart
         })
+    }
+}
+
+/// See [`Targets::squared_gaps`].
+struct Gaps<'a, const N: usize> {
+    targets: &'a Targets<N>,
+    centre: [f64; 3],
+    half: [f64; 3],
+}
+
+impl<'a, const N: usize> Gaps<'a, N> {
+    fn of(targets: &'a Targets<N>, centre: &Vector3<f64>, half: &Vector3<f64>) -> Self {
+        Self { targets, centre: [centre.x, centre.y, centre.z], half: [half.x, half.y, half.z] }
+    }
+}
+
+impl<const N: usize> Wide for Gaps<'_, N> {
+    type Output = [f64; N];
+
+    #[inline(always)]
+    fn run(self) -> [f64; N] {
+        let mut gaps = [0.0; N];
+        for axis in 0..3 {
+            let (centre, half) = (self.centre[axis], self.half[axis]);
+            for (index, gap) in gaps.iter_mut().enumerate() {
+                let apart = (self.targets.centre[axis][index] - centre).abs();
+                let apart = apart - (self.targets.half[axis][index] + half);
+                let apart = if apart > 0.0 { apart } else { 0.0 };
+                *gap += apart * apart;
+            }
+        }
+        gaps
+    }
+}
+
+struct LeastGap<'a, const N: usize>(Gaps<'a, N>);
+
+impl<const N: usize> Wide for LeastGap<'_, N> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn run(self) -> f64 {
+        const { assert!(N.is_multiple_of(CHUNK)) };
+        let mut least = [f64::INFINITY; CHUNK];
+        for chunk in self.0.run().chunks_exact(CHUNK) {
+            for (least, gap) in least.iter_mut().zip(chunk) {
+                *least = if *gap < *least { *gap } else { *least };
+            }
+        }
+        least.iter().fold(f64::INFINITY, |least, gap| if *gap < least { *gap } else { least })
     }
 }

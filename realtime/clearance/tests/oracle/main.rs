@@ -5,6 +5,7 @@
 //! the smallest distance over 401 samples; `through` rows touch on the way.
 #![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
 
+mod contacts;
 mod reference;
 mod single;
 
