@@ -25,6 +25,7 @@ const TRANSIT: Bound = bound("transit_height_m", "m", -2.0, 2.0);
 const RISE: Bound = bound("via_rise_m", "m", 0.0, 1.0);
 const OFFSET: Bound = bound("via_offset_m", "m", 0.0, 1.0);
 const WORK: Bound = bound("planning_work", "samples", 1.0, 100.0);
+const SAMPLING: Bound = bound("sampling_looks_max", "looks", 0.0, 1e7);
 const SETTLE: Bound = bound("settle_ms", "ms", 0.0, 2000.0);
 const ACTION: Bound = bound("action_timeout_ms", "ms", 10.0, 600_000.0);
 const LOST: Bound = bound("part_lost_after_ms", "ms", 0.25, 10_000.0);
@@ -75,6 +76,7 @@ pub(crate) fn read(cell: &Table<'_>, timing: &Timing) -> Params {
         via_rise: number(&RISE, default.via_rise),
         via_offset: number(&OFFSET, default.via_offset),
         planning_work: number(&WORK, f64::from(default.planning_work)) as u32,
+        sampling_looks_max: number(&SAMPLING, f64::from(default.sampling_looks_max)) as u32,
         settle: time(&SETTLE, default.settle),
         action_timeout: time(&ACTION, default.action_timeout),
         part_lost_after: time(&LOST, default.part_lost_after),

@@ -106,7 +106,7 @@ impl Job {
     }
 
     /// What is to be planned at this stage.
-    pub(crate) fn goal(&self, home: &Joints) -> Goal {
+    pub(crate) fn goal(&self, home: &Joints, config_hash: u64) -> Goal {
         let mut base_from_tcp = isometry(&self.task.base_from_tcp);
         if self.away {
             base_from_tcp *= Translation3::new(0.0, 0.0, -self.task.retract);
@@ -121,6 +121,7 @@ impl Job {
             attached: *self.attached(),
             touch: self.touch(),
             touch_at_start: self.touch_at_start(),
+            seed: config_hash ^ (u64::from(self.task.id) << 32),
         }
     }
 

@@ -20,7 +20,7 @@
 //! **Invariant:** an arm that engages is met where it is: the first command
 //! continues its measured position and velocity.
 //! **Invariant:** a stop on a path stays on that path, and the path was swept.
-//! **Invariant:** nothing here allocates (but the list of a refused
+//! **Invariant:** nothing here allocates once it is made (but the list of a refused
 //! [`Params::check`]), blocks, reads a clock or panics; every loop is bounded.
 //!
 //! In simulation only: a software stop is no certified safety function.

@@ -54,6 +54,9 @@ pub struct Params {
     pub via_offset: f64,
     /// Inverse-kinematics solutions and clearance samples the planner may take in one cycle.
     pub planning_work: u32,
+    /// Looks at the scene that the sampling planner may take for a motion when no hand-designed path is
+    /// clear; it takes eight in the time of a sample. 0 = it is not asked.
+    pub sampling_looks_max: u32,
     /// Time at rest before the tool acts, for the arm to settle.
     pub settle: Duration,
     /// How long the tool may take for an action.
@@ -149,6 +152,7 @@ impl Default for Params {
             via_rise: 0.20,
             via_offset: 0.25,
             planning_work: 4,
+            sampling_looks_max: 300_000,
             settle: Duration::from_millis(30),
             action_timeout: Duration::from_secs(20),
             part_lost_after: Duration::from_millis(100),
@@ -240,6 +244,7 @@ impl Params {
         value("via_rise", self.via_rise, 0.0, 1.0, "m");
         value("via_offset", self.via_offset, 0.0, 1.0, "m");
         value("planning_work", f64::from(self.planning_work), 1.0, 100.0, "samples");
+        value("sampling_looks_max", f64::from(self.sampling_looks_max), 0.0, 1e7, "looks");
         value("settle", ms(self.settle), 0.0, 2_000.0, "ms");
         value("action_timeout", ms(self.action_timeout), 10.0, 600_000.0, "ms");
         value("part_lost_after", ms(self.part_lost_after), ms(self.period), 10_000.0, "ms");

@@ -1,4 +1,5 @@
-//! The manual planner: the paper's hand-designed path (Section 3.2.2), its baseline.
+//! The manual planner: the paper's hand-designed path (Section 3.2.2), its baseline; behind it a
+//! sampling planner for the transfer.
 //!
 //! ```text
 //! depart ----> transfer (direct, or over hand-made via points) ----> approach
@@ -12,17 +13,22 @@
 //! configuration). It takes a bounded number of steps a cycle while the arm
 //! stands; a step is one inverse-kinematics solution or one clearance sample.
 //!
+//! **Fallback.** When no candidate is clear, the sampling planner ([`tandem_planner`]) looks for a transfer
+//! from any clear departure to any clear approach, and the plan is said to be its own ([`Search::planner`]).
+//!
 //! **Leaving a contact.** Where the arm starts nearer to something than the
 //! margin asks, as after letting go of a part, the first stretch may not bring it
 //! nearer than it is; the objects of the task and of the one before may be
 //! touched until that stretch is done.
 
 mod route;
+mod sampled;
 
 use nalgebra::{Isometry3, Translation3};
 use tandem_clearance::Monitor;
 use tandem_kinematics::{Branches, Chain};
-use tandem_msg::{AttachedPart, MotionFailure, MotionPhase};
+use tandem_msg::{AttachedPart, MotionFailure, MotionPhase, Planner};
+use tandem_planner::Progress as Sampling;
 
 use crate::law::{Law, LawLimits};
 use crate::line::Line;
@@ -31,13 +37,17 @@ use crate::reach::Reach;
 use crate::sweep::{Sweep, Swept};
 use crate::{Joints, Params};
 use route::{ROUTES, via_points};
+use sampled::{Joined, Sampled};
 use tandem_trajectory::State;
 
 /// Objects that may be touched: those of a task and of the task before it. 0 = none.
 pub(crate) type Touch = [u32; 16];
 
-/// Stretches of a plan: depart, up to three across, approach.
-const LEGS_MAX: usize = 5;
+/// Stretches of a plan: depart, across, approach. By hand there are up to three across; a sampled way with
+/// more than fit is none.
+const LEGS_MAX: usize = 18;
+/// Looks of the sampling planner that take as long as a clearance sample and an inverse-kinematics solution.
+const LOOKS_PER_STEP: u32 = 8;
 /// Ways to depart.
 const DEPARTS: usize = 3;
 /// A start that is this far off the approach line, or less, is on it: metres, rad.
@@ -78,6 +88,8 @@ pub(crate) struct Goal {
     pub(crate) touch: Touch,
     /// May be touched on the first stretch.
     pub(crate) touch_at_start: Touch,
+    /// Where a sampled way takes its randomness from.
+    pub(crate) seed: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,6 +105,8 @@ enum Step {
     DepartSweep,
     Route,
     RouteSweep,
+    Sample,
+    Join,
     Found,
     Failed(MotionFailure),
 }
@@ -128,6 +142,9 @@ pub(crate) struct Search {
     /// Legs of the present candidate that are checked already.
     checked: usize,
     floor: f64,
+    sampled: Sampled,
+    /// What the sampled transfer joins, once there is one.
+    joined: Option<Joined>,
 }
 
 /// What a search works with.
@@ -159,6 +176,7 @@ impl Search {
                 attached: AttachedPart::default(),
                 touch: [0; 16],
                 touch_at_start: [0; 16],
+                seed: 0,
             },
             start: nowhere,
             start_pose: Isometry3::identity(),
@@ -178,6 +196,8 @@ impl Search {
             count: 0,
             checked: 0,
             floor: 0.0,
+            sampled: Sampled::new(),
+            joined: None,
         }
     }
 
@@ -187,6 +207,13 @@ impl Search {
         self.start = *start;
         self.step = Step::Begin;
         self.count = 0;
+        self.sampled.clear();
+        self.joined = None;
+    }
+
+    /// Who made the plan.
+    pub(crate) fn planner(&self) -> Planner {
+        if self.joined.is_some() { Planner::RrtConnect } else { Planner::Manual }
     }
 
     /// The stretches found.
@@ -215,6 +242,7 @@ impl Search {
                     let cost = match step {
                         Step::StraightLine | Step::ApproachLine | Step::DepartLine => 4,
                         Step::StraightSweep | Step::ApproachSweep | Step::DepartSweep | Step::RouteSweep => 4,
+                        Step::Sample => 4,
                         _ => 2,
                     };
                     budget = budget.saturating_sub(cost);
@@ -245,7 +273,7 @@ impl Search {
                 Swept::Clear => Step::Found,
                 Swept::Blocked => self.after_straight(tools),
             },
-            Step::Branch => self.next_branch(),
+            Step::Branch => self.next_branch(tools),
             Step::ApproachLine => match self.line.step(tools.chain) {
                 Ok(None) => step,
                 Ok(Some(path)) => {
@@ -263,7 +291,10 @@ impl Search {
             Step::ApproachSweep => match &self.approach {
                 Some(leg) => match self.sweep.step(tools.chain, tools.monitor, &leg.path) {
                     Swept::More => step,
-                    Swept::Clear => self.first_depart(),
+                    Swept::Clear => {
+                        self.sampled.note_goal(self.branch - 1, &self.across_to);
+                        self.first_depart()
+                    }
                     Swept::Blocked => Step::Branch,
                 },
                 None => Step::Failed(MotionFailure::NoClearPath),
@@ -282,10 +313,7 @@ impl Search {
             },
             Step::DepartSweep => match self.sweep.step(tools.chain, tools.monitor, &self.legs[0].path) {
                 Swept::More => step,
-                Swept::Clear => {
-                    self.route = 0;
-                    Step::Route
-                }
+                Swept::Clear => self.departed(),
                 Swept::Blocked => Step::Depart,
             },
             Step::Route => self.next_route(tools),
@@ -297,14 +325,16 @@ impl Search {
                         self.sweep_leg(tools, self.checked);
                         return step;
                     }
-                    if let Some(approach) = &self.approach {
-                        self.legs[self.count] = *approach;
-                        self.count += 1;
-                    }
-                    Step::Found
+                    self.finish()
                 }
                 Swept::Blocked => Step::Route,
             },
+            Step::Sample => match self.sampled.work(tools.chain, tools.monitor, LOOKS_PER_STEP) {
+                Sampling::Searching => step,
+                Sampling::Failed(_) => Step::Failed(MotionFailure::NoClearPath),
+                Sampling::Found => self.begin_joining(),
+            },
+            Step::Join => self.join(tools),
             Step::Found | Step::Failed(_) => step,
         }
     }
@@ -358,17 +388,25 @@ impl Search {
         }
     }
 
-    fn next_branch(&mut self) -> Step {
-        if self.branch >= self.branch_count {
-            let failure = if self.reached { MotionFailure::NoClearPath } else { MotionFailure::Unreachable };
-            return Step::Failed(failure);
+    fn next_branch(&mut self, tools: &mut Tools<'_>) -> Step {
+        if self.joined.is_some() {
+            return Step::Failed(MotionFailure::NoClearPath);
         }
-        let goal = self.branches[self.branch];
+        if self.branch >= self.branch_count {
+            return self.fall_back(tools);
+        }
         self.branch += 1;
+        self.begin_branch()
+    }
+
+    /// The approach of the branch in hand, where there is one.
+    fn begin_branch(&mut self) -> Step {
+        let goal = self.branches[self.branch - 1];
         if self.goal.joints.is_some() || self.goal.approach <= 0.0 {
             self.reached = true;
             self.approach = None;
             self.across_to = goal;
+            self.sampled.note_goal(self.branch - 1, &goal);
             return self.first_depart();
         }
         let end = &self.goal.base_from_tcp;
@@ -378,19 +416,29 @@ impl Search {
     }
 
     fn first_depart(&mut self) -> Step {
-        self.depart = 0;
+        self.depart = self.joined.map_or(0, |joined| joined.way);
         Step::Depart
+    }
+
+    /// The way to depart in hand is clear.
+    fn departed(&mut self) -> Step {
+        self.sampled.note_start(self.depart - 1, &self.depart_end);
+        self.route = 0;
+        if self.joined.is_some() { Step::Join } else { Step::Route }
     }
 
     fn next_depart(&mut self, tools: &mut Tools<'_>) -> Step {
         let way = self.depart;
         self.depart += 1;
         self.route = 0;
+        if self.joined.is_some_and(|joined| joined.way != way) {
+            return Step::Failed(MotionFailure::NoClearPath);
+        }
         let from = self.start_pose;
         let to = match way {
             0 => {
                 self.depart_end = self.start;
-                return Step::Route;
+                return self.departed();
             }
             1 => from * Translation3::new(0.0, 0.0, -tools.params.depart_distance),
             _ if way < DEPARTS => {
@@ -435,6 +483,57 @@ impl Search {
         self.checked = first;
         self.sweep_leg(tools, first);
         Step::RouteSweep
+    }
+
+    /// No candidate is clear: the transfer is left to the sampling planner, where there is one to search.
+    fn fall_back(&mut self, tools: &mut Tools<'_>) -> Step {
+        if !self.reached {
+            return Step::Failed(MotionFailure::Unreachable);
+        }
+        if !self.sampled.is_promising() || tools.params.sampling_looks_max == 0 {
+            return Step::Failed(MotionFailure::NoClearPath);
+        }
+        tools.monitor.set_touch(&[0; 16]);
+        self.sampled.begin(tools.chain, tools.monitor, tools.params, self.goal.seed);
+        Step::Sample
+    }
+
+    /// A transfer was found: its departure and approach are made once more.
+    fn begin_joining(&mut self) -> Step {
+        self.joined = self.sampled.joined();
+        self.approach = None;
+        match self.joined {
+            Some(joined) => {
+                self.branch = joined.branch + 1;
+                self.begin_branch()
+            }
+            None => Step::Failed(MotionFailure::NoClearPath),
+        }
+    }
+
+    /// Puts departure, sampled transfer and approach together.
+    fn join(&mut self, tools: &Tools<'_>) -> Step {
+        let first = usize::from(self.depart > 1);
+        let across = self.sampled.path().len().saturating_sub(1);
+        if first + across + usize::from(self.approach.is_some()) > LEGS_MAX {
+            return Step::Failed(MotionFailure::NoClearPath);
+        }
+        for index in 0..across {
+            let [from, to] = [index, index + 1].map(|k| self.sampled.path()[k]);
+            let path = Path::line(&from, &to);
+            self.legs[first + index] = self.leg(tools, &path, MotionPhase::Transfer, [0; 16], tools.params.path_margin);
+        }
+        self.count = first + across;
+        self.finish()
+    }
+
+    /// All up to the approach is there.
+    fn finish(&mut self) -> Step {
+        if let Some(approach) = &self.approach {
+            self.legs[self.count] = *approach;
+            self.count += 1;
+        }
+        Step::Found
     }
 
     fn sweep_leg(&mut self, tools: &mut Tools<'_>, index: usize) {

@@ -46,7 +46,7 @@ pub struct ControllerOutputs {
     pub status: MotionStatus,
 }
 
-/// The controller role. A value of some tens of kilobytes that never grows.
+/// The controller role. It never grows: some hundred kilobytes in place, and the trees of its sampling planner.
 pub struct Controller {
     chain: Chain,
     params: Params,
@@ -305,7 +305,7 @@ impl Controller {
             task_id: self.job.task.id,
             phase: Code::of(self.job.phase(leg)),
             failure: Code::of(self.job.failure()),
-            planner: Code::of(if planned { Planner::Manual } else { Planner::None }),
+            planner: Code::of(if planned { self.search.planner() } else { Planner::None }),
             stop: Code::of(self.stop.state()),
             cause: Code::of(self.stop.cause()),
             category: Code::of(self.stop.category()),

@@ -87,7 +87,7 @@ impl Controller {
             return;
         }
         if !begun {
-            let goal = self.job.goal(&self.params.home);
+            let goal = self.job.goal(&self.params.home, self.params.config_hash);
             if !self.job.away && goal.joints.is_none() && goal.approach <= 0.0 && self.stands_at(&goal) {
                 // Nothing but the tool is to act. After a stop the arm stands a little beside the goal, and a
                 // person who holds the part would keep it from moving that little for ever.
