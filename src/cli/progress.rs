@@ -120,6 +120,9 @@ fn remark(kind: &EventKind) -> Option<String> {
             };
             format!("{part}: {reason}: {why}")
         }
+        EventKind::Fallback { subtask, part, from, planner } => {
+            format!("{part}: {subtask}: every {from} path is blocked; planned by {planner}")
+        }
         EventKind::Prompt { text, .. } => format!("to the person: {text}"),
         EventKind::Answer { answer, class, .. } if *answer != "done" && *answer != "started" => {
             format!("the person: {answer}{}", class.map(|class| format!(" ({class})")).unwrap_or_default())

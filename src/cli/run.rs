@@ -248,6 +248,7 @@ fn table(summary: &Summary, restarts: u32, wall_time_s: f64) -> Table {
         ("boxes completed", format!("{} of {}", summary.boxes_completed, summary.boxes_requested)),
         ("steps done", summary.steps_done.to_string()),
         ("attempts failed", summary.steps_failed.to_string()),
+        ("fallback plans", summary.fallbacks.to_string()),
         ("protective stops", summary.stops.to_string()),
         ("contacts", summary.contacts.to_string()),
         ("restarted processes", restarts.to_string()),

@@ -147,6 +147,17 @@ pub enum EventKind {
         #[serde(skip_serializing_if = "Option::is_none")]
         planner: Option<&'static str>,
     },
+    /// A planner found no way, and the next one did.
+    Fallback {
+        /// Subtask.
+        subtask: &'static str,
+        /// Part.
+        part: String,
+        /// Whose candidates were all blocked.
+        from: &'static str,
+        /// Who planned the motion.
+        planner: &'static str,
+    },
     /// A person is asked for something.
     Prompt {
         /// What.
@@ -328,6 +339,8 @@ pub struct Summary {
     pub steps_done: u32,
     /// Attempts at a step that failed.
     pub steps_failed: u32,
+    /// Motions that had to be planned by the next planner.
+    pub fallbacks: u32,
     /// Protective stops.
     pub stops: u32,
     /// Referee: contacts with what must not be touched.

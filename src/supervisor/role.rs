@@ -96,6 +96,7 @@ impl Supervisor {
             boxes_completed: 0,
             steps_done: 0,
             steps_failed: 0,
+            fallbacks: 0,
             stops: 0,
             contacts: 0,
             min_clearance_m: None,

@@ -38,12 +38,15 @@ impl Current {
         }
     }
 
-    /// Takes up what the controller says of this motion.
+    /// Takes up what the controller says of this motion. Who planned the way to the goal is kept: the way
+    /// back after the action is always straight.
     pub(super) fn follow(&mut self, motion: &MotionStatus) {
         if motion.clearance_min.is_finite() {
             self.clearance_min = self.clearance_min.min(motion.clearance_min);
         }
-        if let Some(planner) = motion.planner.get().filter(|planner| *planner != Planner::None) {
+        if self.planner != Planner::RrtConnect
+            && let Some(planner) = motion.planner.get().filter(|planner| *planner != Planner::None)
+        {
             self.planner = planner;
         }
     }

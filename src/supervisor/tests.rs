@@ -250,6 +250,20 @@ fn every_stop_is_followed_by_motion_again() {
     }
 }
 
+/// Each motion that the next planner had to plan is told once, and counted.
+#[test]
+fn fallbacks_are_told() {
+    let run = Fake::new(Script { sampled: Some(Subtask::Transfer), ..Script::default() }, 1).run();
+    assert_eq!(run.outcome, Outcome::Completed);
+    let transfers = run
+        .events(|kind| matches!(kind, EventKind::ActionDone { subtask: "transfer", planner: Some("rrt_connect"), .. }));
+    let told = run.events(|kind| {
+        matches!(kind, EventKind::Fallback { subtask: "transfer", from: "manual", planner: "rrt_connect", .. })
+    });
+    assert!(transfers > 0 && told == transfers, "{transfers} transfers, {told} told");
+    assert_eq!(run.summary().fallbacks as usize, told);
+}
+
 #[test]
 fn a_cell_found_unfit_ends_the_run() {
     let script = Script {

@@ -9,8 +9,8 @@ use crate::strategy::StepState;
 use std::time::Duration;
 use tandem_config::{Form, Verb};
 use tandem_msg::{
-    Answer, Code, Coded, EffectorAction, MotionFailure, MotionPhase, MotionTask, Pose, PromptKind, RunMode, StopState,
-    Subtask, Tool,
+    Answer, Code, Coded, EffectorAction, MotionFailure, MotionPhase, MotionTask, Planner, Pose, PromptKind, RunMode,
+    StopState, Subtask, Tool,
 };
 
 impl Supervisor {
@@ -19,12 +19,19 @@ impl Supervisor {
             return self.complete(out);
         }
         let Some(mut current) = self.work.current.take() else { return };
+        let planner = current.planner;
         let result = match current.operation.clone() {
             Operation::Motion(task) => self.follow_motion(&task, &mut current, inputs, passed),
             Operation::Ask { until, .. } | Operation::Await { until, .. } => {
                 self.follow_prompt(until, &current, inputs, out)
             }
         };
+        if current.planner != planner && current.planner == Planner::RrtConnect {
+            self.summary.fallbacks += 1;
+            let (_, subtask) = current.operation.names();
+            let (part, planner) = (self.part().name.clone(), current.planner.name());
+            self.say(out, EventKind::Fallback { subtask, part, from: Planner::Manual.name(), planner });
+        }
         match result {
             Progress::Going => self.work.current = Some(current),
             Progress::Done => self.operation_done(&current, out),

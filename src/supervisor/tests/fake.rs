@@ -35,6 +35,8 @@ pub(super) struct Script {
     pub(super) motion_hangs: Option<Subtask>,
     /// The arm is stopped once in a motion of this kind.
     pub(super) stops: Option<(Subtask, StopCause)>,
+    /// The subtask whose motions the controller cannot plan by hand.
+    pub(super) sampled: Option<Subtask>,
     /// This role is lost once in a motion of this kind, and comes back if the flag says so.
     pub(super) loses: Option<(Role, Subtask, bool)>,
     /// The journal stops being durable past this entry.
@@ -240,7 +242,8 @@ impl Fake {
         if task.id != self.motion.task_id {
             self.motion.task_id = task.id;
             self.motion.phase = Code::of(if task.id == 0 { MotionPhase::Idle } else { MotionPhase::Transfer });
-            self.motion.planner = Code::of(Planner::Manual);
+            let sampled = self.script.sampled.is_some_and(|subtask| task.subtask.is(subtask));
+            self.motion.planner = Code::of(if sampled { Planner::RrtConnect } else { Planner::Manual });
             self.motion.clearance_min = 0.02;
             self.motion_since = self.now;
             let objects = self.outputs.scene.objects().iter().map(|object| object.id).collect();
