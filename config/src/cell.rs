@@ -144,10 +144,16 @@ fn read_robot(root: &Table<'_>, folder: &Path, reading: &Reading) -> Option<Robo
         home: list(&HOME),
         acceleration_max: list(&ACCELERATION),
         jerk_max: list(&JERK),
+        locked: table.texts("locked"),
+        packages: package_folders(folder, &table.texts("packages")),
+        srdf: read_srdf(&table, folder, reading),
     };
     let found = format!("\"{}\"", file.display());
     let document = reading.open(&file, Some(table.fault_at("urdf", &found, "a URDF file", "")))?;
     let robot = Robot::parse(&file, &document.text, &options).map_err(|faults| reading.note_all(faults)).ok()?;
+    for mesh in &robot.meshes {
+        reading.fold(mesh);
+    }
     let joints = robot.chain.joint_count();
     for (key, list) in
         [(HOME.key, &options.home), (ACCELERATION.key, &options.acceleration_max), (JERK.key, &options.jerk_max)]
@@ -167,6 +173,20 @@ fn read_robot(root: &Table<'_>, folder: &Path, reading: &Reading) -> Option<Robo
         }
     }
     Some(robot)
+}
+
+/// The folders of the cell file, beside it, then those of ROS_PACKAGE_PATH.
+fn package_folders(folder: &Path, named: &[String]) -> Vec<PathBuf> {
+    let of_environment = std::env::var_os("ROS_PACKAGE_PATH").unwrap_or_default();
+    let named = named.iter().map(|name| beside(folder, name));
+    named.chain(std::env::split_paths(&of_environment).filter(|path| !path.as_os_str().is_empty())).collect()
+}
+
+fn read_srdf(table: &Table<'_>, folder: &Path, reading: &Reading) -> Option<(PathBuf, String)> {
+    let file = beside(folder, &table.text_if("srdf")?);
+    let found = format!("\"{}\"", file.display());
+    let document = reading.open(&file, Some(table.fault_at("srdf", &found, "an SRDF file", "")))?;
+    Some((file, document.text))
 }
 
 fn read_store(root: &Table<'_>) -> Store {

@@ -108,6 +108,14 @@ impl Reading {
         }
     }
 
+    /// Folds a file that was read elsewhere into the hash.
+    pub(crate) fn fold(&self, path: &Path) {
+        let bytes = std::fs::read(path).unwrap_or_default();
+        let mut hasher = self.hasher.borrow_mut();
+        hasher.update(&(bytes.len() as u64).to_le_bytes());
+        hasher.update(&bytes);
+    }
+
     pub(crate) fn note(&self, fault: Fault) {
         self.faults.borrow_mut().push(fault);
     }

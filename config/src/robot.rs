@@ -1,22 +1,27 @@
 //! The arm: a URDF read into a chain, a body of capsules and the masses of its links.
 //!
 //! Any serial chain of up to eight moving joints is accepted: fixed joints are
-//! folded into the link they hang on, collision primitives are covered by capsules,
-//! and the pairs of links that must not meet are worked out here. Everything else
-//! is refused with its place in the file: meshes, joints that mimic or branch off,
-//! links without mass or shape, limits that are none.
+//! folded into the link they hang on, and with them those the cell holds still;
+//! collision shapes and meshes are covered by capsules, and the pairs of links that
+//! must not meet are worked out here, less what an SRDF allows. Everything else is
+//! refused with its place in the file: meshes that are not there, joints that mimic
+//! or branch off, links without mass or shape, limits that are none.
 //!
 //! **Invariant:** a [`Robot`] never covers less than its file's collision geometry.
 
 mod contact;
 mod inertia;
+mod lock;
+mod mesh;
 mod shape;
 mod source;
+mod srdf;
 mod tree;
 
 use crate::fault::{Fault, Faults};
 use nalgebra::{Isometry3, Unit, Vector3};
 use source::Source;
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use tandem_clearance::{ArmBody, LINK_CAPSULES_MAX, LinkCapsule};
 use tandem_kinematics::{Chain, JOINTS_MAX, Joint, JointKind};
@@ -42,6 +47,12 @@ pub struct RobotOptions {
     pub acceleration_max: Option<Vec<f64>>,
     /// Largest jerks; else the URDF's, else ten times the acceleration, per second.
     pub jerk_max: Option<Vec<f64>>,
+    /// Joints that are held still where they stand nearest to 0; what mimics them is held too.
+    pub locked: Vec<String>,
+    /// Folders in which `package://` is looked for.
+    pub packages: Vec<PathBuf>,
+    /// Name and text of an SRDF, whose `disable_collisions` are obeyed.
+    pub srdf: Option<(PathBuf, String)>,
 }
 
 /// An arm that passed every check.
@@ -52,7 +63,7 @@ pub struct Robot {
     pub name: String,
     /// The file.
     pub file: PathBuf,
-    /// The file as it was read.
+    /// The file as it was read, locked joints fixed.
     pub urdf: urdf_rs::Robot,
     /// Moving joints and TCP.
     pub chain: Chain,
@@ -62,6 +73,10 @@ pub struct Robot {
     pub links: Vec<LinkInertia>,
     /// Names of the moving joints, from the base outwards.
     pub joint_names: Vec<String>,
+    /// Mesh files the body was made from.
+    pub meshes: Vec<PathBuf>,
+    /// What was put right while reading, a sentence each.
+    pub notes: Vec<String>,
     /// Where the arm rests, rad or m.
     pub home: [f64; JOINTS_MAX],
 }
@@ -92,13 +107,16 @@ impl Robot {
     /// All faults found, never none.
     pub fn parse(file: &Path, text: &str, options: &RobotOptions) -> Result<Self, Vec<Fault>> {
         let source = Source::scan(&file.display().to_string(), text)?;
-        let urdf = urdf_rs::read_from_string(text).map_err(|error| vec![source.refused(&error.to_string())])?;
+        let mut urdf = urdf_rs::read_from_string(text).map_err(|error| vec![source.refused(&error.to_string())])?;
+        lock::lock(&source, &mut urdf, &options.locked)?;
         let tree = Tree::of(&source, &urdf, options.tcp.as_deref())?;
 
         let mut faults = Vec::new();
         let joints = moving_joints(&source, &urdf, &tree, options, &mut faults);
-        let links = inertia::links(&source, &urdf, &tree, &mut faults);
-        let capsules = shape::capsules(&source, &urdf, &tree, &mut faults);
+        let mut links = inertia::links(&source, &urdf, &tree, &mut faults);
+        let mut meshes = shape::Meshes { urdf: file, packages: &options.packages, read: Vec::new() };
+        let capsules = shape::capsules(&source, &urdf, &tree, &mut meshes, &mut faults);
+        let meshes = meshes.read;
         if capsules.len() > LINK_CAPSULES_MAX {
             let found = format!("{} capsules around its links", capsules.len());
             let allowed = format!("at most {LINK_CAPSULES_MAX}");
@@ -107,12 +125,20 @@ impl Robot {
         if !faults.is_empty() {
             return Err(faults);
         }
+        let allowed = match &options.srdf {
+            Some((name, text)) => {
+                let srdf = Source::scan(&name.display().to_string(), text)?;
+                srdf::allowed_pairs(&srdf, &urdf, &tree)?
+            }
+            None => BTreeSet::new(),
+        };
+        let notes = inertia::put_right(&mut links, &capsules);
 
         let of_robot =
             |error: &dyn std::fmt::Display| vec![source.fault_of_robot("", &error.to_string(), "", "mend the file")];
         let chain = Chain::new(&joints, tree.tip_from_tcp).map_err(|error| of_robot(&error))?;
         let home = home(&chain, options);
-        let body = body(&chain, &capsules, &home).map_err(|error| of_robot(&error))?;
+        let body = body(&chain, &capsules, &home, &allowed).map_err(|error| of_robot(&error))?;
         Ok(Self {
             name: urdf.name.clone(),
             file: file.to_owned(),
@@ -120,6 +146,8 @@ impl Robot {
             chain,
             body,
             links,
+            meshes,
+            notes,
             home,
             urdf,
         })
@@ -130,8 +158,10 @@ fn body(
     chain: &Chain,
     capsules: &[LinkCapsule],
     home: &[f64; JOINTS_MAX],
+    allowed: &BTreeSet<[usize; 2]>,
 ) -> Result<ArmBody, tandem_clearance::BodyError> {
-    let pairs = contact::pairs_to_check(chain, capsules, home)?;
+    let mut pairs = contact::pairs_to_check(chain, capsules, home)?;
+    pairs.retain(|pair| !allowed.contains(pair));
     ArmBody::new(capsules, &pairs)
 }
 

@@ -157,8 +157,8 @@ fn what_makes_no_arm_is_refused_with_its_place() {
     };
     assert_eq!(
         with("<sphere radius=\"0.1\"/>", "<mesh filename=\"package://arm/slider.stl\"/>"),
-        "arm.urdf:7:26: link \"slider\" collision mesh = \"package://arm/slider.stl\", \
-         allowed box, cylinder, capsule, sphere; cover the mesh with primitives"
+        "arm.urdf:7:26: link \"slider\" collision mesh = \"package://arm/slider.stl\"; \
+         list the folders of packages as robot.packages of the cell, or in ROS_PACKAGE_PATH"
     );
     assert_eq!(
         with("<sphere radius=\"0.1\"/>", "<sphere radius=\"-0.1\"/>"),
@@ -166,12 +166,12 @@ fn what_makes_no_arm_is_refused_with_its_place() {
     );
     assert_eq!(
         with("<sphere radius=\"0.1\"/>", "<cone radius=\"0.1\"/>"),
-        "arm.urdf:7:26: a <cone> shape, allowed box, cylinder, capsule, sphere; use one of these"
+        "arm.urdf:7:26: a <cone> shape, allowed box, cylinder, capsule, sphere, mesh; use one of these"
     );
     assert_eq!(
         with("<collision><geometry><sphere radius=\"0.1\"/></geometry></collision>", ""),
         "arm.urdf:6:3: link \"slider\" collision is missing, allowed at least one shape; \
-         give the link a <collision> of primitives: a joint moves it"
+         give the link a <collision>: a joint moves it"
     );
     assert_eq!(
         with("<mass value=\"2\"/>", "<mass value=\"0\"/>"),
@@ -213,7 +213,8 @@ fn what_makes_no_arm_is_refused_with_its_place() {
     );
     assert_eq!(
         with("<axis xyz=\"0 0 2\"/>", "<mimic joint=\"reach\"/>"),
-        "arm.urdf:12:5: joint \"head_turn\" mimic = of joint \"reach\", allowed joints that move by themselves; make it fixed"
+        "arm.urdf:12:5: joint \"head_turn\" mimic = of joint \"reach\", allowed joints that move by themselves; \
+         name what it follows in robot.locked of the cell, or make it fixed"
     );
     assert_eq!(
         with("<parent link=\"slider\"/>", "<parent link=\"slidder\"/>"),
@@ -244,9 +245,9 @@ fn what_makes_no_arm_is_refused_with_its_place() {
             "<link name=\"tcp\"/><joint name=\"j\" type=\"fixed\"><parent link=\"bracket\"/><child link=\"tcp\"/></joint></robot>"
         ),
         "arm.urdf:11:3: joint \"head_turn\" type = \"continuous\" beside the chain to \"tcp\", \
-         allowed moving joints between base and TCP only; make it fixed, or name another link as robot.tcp of the cell\n\
+         allowed moving joints between base and TCP only; name it in robot.locked of the cell, or another link as robot.tcp\n\
          arm.urdf:16:3: joint \"reach\" type = \"prismatic\" beside the chain to \"tcp\", \
-         allowed moving joints between base and TCP only; make it fixed, or name another link as robot.tcp of the cell"
+         allowed moving joints between base and TCP only; name it in robot.locked of the cell, or another link as robot.tcp"
     );
     assert_eq!(
         with("<parent link=\"world\"/>", "<parent link=\"nozzle\"/>"),

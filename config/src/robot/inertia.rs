@@ -4,7 +4,8 @@ use super::origin;
 use super::source::Source;
 use super::tree::Tree;
 use crate::fault::Fault;
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
+use tandem_clearance::LinkCapsule;
 
 /// How mass is spread over one link of the chain.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,6 +62,53 @@ pub(super) fn links(source: &Source, urdf: &urdf_rs::Robot, tree: &Tree, faults:
         links.push(LinkInertia { name, mass: total.mass, centre: total.centre.into(), inertia });
     }
     links
+}
+
+/// Replaces inertias that no body of a link's shape can have (a gyration radius past its farthest
+/// point, as the wrists of the widespread UR5 file) by those of its capsules taken as solid.
+/// Answers a sentence for each.
+pub(super) fn put_right(links: &mut [LinkInertia], capsules: &[LinkCapsule]) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (index, link) in links.iter_mut().enumerate().skip(1) {
+        let centre = Vector3::from(link.centre);
+        let own: Vec<&LinkCapsule> = capsules.iter().filter(|capsule| capsule.link == index).collect();
+        let reach = |capsule: &&LinkCapsule| {
+            capsule
+                .ends
+                .map(|end| (Vector3::from(end) - centre).norm() + capsule.radius)
+                .into_iter()
+                .fold(0.0, f64::max)
+        };
+        let farthest = own.iter().map(reach).fold(0.0, f64::max);
+        let given = Matrix3::from_fn(|row, column| link.inertia[row][column]);
+        let gyration = (given.symmetric_eigenvalues().max() / link.mass).sqrt();
+        if gyration <= farthest {
+            continue;
+        }
+        let length = |capsule: &LinkCapsule| (Vector3::from(capsule.ends[1]) - Vector3::from(capsule.ends[0])).norm();
+        // A cylinder as long as the capsule stands for it.
+        let volume = |capsule: &LinkCapsule| capsule.radius.powi(2) * (length(capsule) + 2.0 * capsule.radius);
+        let whole: f64 = own.iter().map(|capsule| volume(capsule)).sum();
+        let mut inertia = Matrix3::zeros();
+        for capsule in own {
+            let [a, b] = capsule.ends.map(Vector3::from);
+            let mass = link.mass * volume(capsule) / whole;
+            let axis = Unit::try_new(b - a, 1e-9).unwrap_or(Vector3::z_axis());
+            let (radius, long) = (capsule.radius, length(capsule) + 2.0 * capsule.radius);
+            let (about, across) = (mass * radius * radius / 2.0, mass * (3.0 * radius * radius + long * long) / 12.0);
+            let along = axis.into_inner() * axis.transpose();
+            let off = (a + b) / 2.0 - centre;
+            inertia += Matrix3::identity() * across + along * (about - across);
+            inertia += (Matrix3::identity() * off.norm_squared() - off * off.transpose()) * mass;
+        }
+        link.inertia = std::array::from_fn(|row| std::array::from_fn(|column| inertia[(row, column)]));
+        notes.push(format!(
+            "link \"{}\": its inertia has a gyration radius of {gyration:.2} m, past its farthest point at \
+             {farthest:.2} m; taken as that of its collision shape",
+            link.name
+        ));
+    }
+    notes
 }
 
 fn check_moving(source: &Source, name: &str, total: &Part, faults: &mut Vec<Fault>) {

@@ -1,10 +1,12 @@
-//! Collision primitives, covered by capsules.
+//! Collision shapes, covered by capsules.
 
+use super::mesh::{self, Capsule};
 use super::origin;
 use super::source::Source;
 use super::tree::{Member, Tree};
 use crate::fault::Fault;
 use nalgebra::{Point3, Vector3};
+use std::path::{Path, PathBuf};
 use tandem_clearance::LinkCapsule;
 use urdf_rs::Geometry;
 
@@ -14,22 +16,48 @@ const WIDER: f64 = 1.1;
 /// Capsules side by side around one box.
 const ROWS_MAX: usize = 4;
 
+/// Where meshes are looked for, and which were read.
+pub(super) struct Meshes<'p> {
+    /// The URDF: other paths are relative to its folder.
+    pub(super) urdf: &'p Path,
+    /// Folders of packages.
+    pub(super) packages: &'p [PathBuf],
+    /// Files that were read.
+    pub(super) read: Vec<PathBuf>,
+}
+
+impl Meshes<'_> {
+    /// A capsule around a mesh, in the shape's frame.
+    fn cover(&mut self, name: &str, scale: [f64; 3]) -> Result<Capsule, (String, String)> {
+        if !scale.iter().all(|factor| factor.is_finite() && *factor != 0.0) {
+            return Err((format!("\"{name}\" of scale {scale:?}"), "write finite factors that are not 0".into()));
+        }
+        let file = mesh::resolve(name, self.urdf, self.packages)?;
+        let vertices = mesh::vertices(&file)?;
+        self.read.push(file);
+        let scale = Vector3::from(scale);
+        let scaled: Vec<_> = vertices.iter().map(|vertex| vertex.component_mul(&scale)).collect();
+        Ok(mesh::around(&scaled))
+    }
+}
+
 /// Capsules around every collision shape of the chain's links, in the order of the links.
 pub(super) fn capsules(
     source: &Source,
     urdf: &urdf_rs::Robot,
     tree: &Tree,
+    meshes: &mut Meshes,
     faults: &mut Vec<Fault>,
 ) -> Vec<LinkCapsule> {
     let mut capsules = Vec::new();
     for link in 0..=tree.chain.len() {
         let before = (capsules.len(), faults.len());
         for member in tree.members.iter().filter(|member| member.link == link) {
-            cover_member(source, &urdf.links[member.index], member, &mut capsules, faults);
+            cover_member(source, &urdf.links[member.index], member, meshes, &mut capsules, faults);
         }
         if link > 0 && before == (capsules.len(), faults.len()) {
             let name = &urdf.joints[tree.chain[link - 1].index].child.link;
-            let advice = "give the link a <collision> of primitives: a joint moves it";
+            let advice = "give the link a <collision>: a joint moves it";
             faults.push(source.fault_in("link", name, "", "collision", "missing", "at least one shape", advice));
         }
     }
@@ -40,6 +68,7 @@ fn cover_member(
     source: &Source,
     link: &urdf_rs::Link,
     member: &Member,
+    meshes: &mut Meshes,
     capsules: &mut Vec<LinkCapsule>,
     faults: &mut Vec<Fault>,
 ) {
@@ -59,10 +88,13 @@ fn cover_member(
             tool: member.tool,
         };
         match &collision.geometry {
-            Geometry::Mesh { filename, .. } => {
-                let found = format!("\"{filename}\"");
-                let advice = "cover the mesh with primitives";
-                refuse("collision/geometry/mesh", "collision mesh", &found, "box, cylinder, capsule, sphere", advice);
+            Geometry::Mesh { filename, scale } => {
+                match meshes.cover(filename, scale.as_ref().map_or([1.0; 3], |scale| scale.0)) {
+                    Ok((ends, radius)) => capsules.push(place(ends, radius)),
+                    Err((found, advice)) => {
+                        refuse("collision/geometry/mesh", "collision mesh", &found, "", &advice);
+                    }
+                }
             }
             geometry => match covering(geometry) {
                 Some(covers) => capsules.extend(covers.into_iter().map(|(ends, radius)| place(ends, radius))),

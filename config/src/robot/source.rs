@@ -64,7 +64,7 @@ impl<'t> Source<'t> {
                 }
                 ("geometry", shape) if !SHAPES.contains(&shape) => {
                     let found = format!("a <{shape}> shape");
-                    faults.push(self.fault(at, "", &found, "box, cylinder, capsule, sphere", "use one of these"));
+                    faults.push(self.fault(at, "", &found, "box, cylinder, capsule, sphere, mesh", "use one of these"));
                 }
                 _ => {}
             }
@@ -152,7 +152,19 @@ impl<'t> Source<'t> {
         Some(at)
     }
 
-    fn fault(&self, at: Option<usize>, field: &str, found: &str, allowed: &str, advice: &str) -> Fault {
+    /// Offset and two attributes of every element of that name directly below the root.
+    pub(super) fn pairs<'s>(
+        &'s self,
+        name: &'s str,
+        keys: [&'s str; 2],
+    ) -> impl Iterator<Item = (usize, [Option<&'s str>; 2])> {
+        let top = |tag: &&Tag| tag.parent.is_some_and(|parent| self.tags[parent].parent.is_none());
+        let named = self.tags.iter().filter(top).filter(move |tag| tag.name == name);
+        named.map(move |tag| (tag.offset, keys.map(|key| tag.attribute(key))))
+    }
+
+    /// A fault at an offset.
+    pub(super) fn fault(&self, at: Option<usize>, field: &str, found: &str, allowed: &str, advice: &str) -> Fault {
         let (line, column) = at.map_or((0, 0), |offset| {
             let before = &self.text[..offset];
             let start = before.rfind('\n').map_or(0, |newline| newline + 1);

@@ -219,10 +219,16 @@ fn check_joints(source: &Source, urdf: &urdf_rs::Robot, moving: &[usize], tcp: &
             refuse("", "type", &found, "revolute, continuous, prismatic, fixed", "an arm has joints of one axis");
         } else if let Some(mimic) = &joint.mimic {
             let found = format!("of joint \"{}\"", mimic.joint);
-            refuse("mimic", "mimic", &found, "joints that move by themselves", "make it fixed");
+            refuse(
+                "mimic",
+                "mimic",
+                &found,
+                "joints that move by themselves",
+                "name what it follows in robot.locked of the cell, or make it fixed",
+            );
         } else if !moving.contains(&index) {
             let found = format!("\"{kind}\" beside the chain to \"{tcp}\"");
-            let advice = "make it fixed, or name another link as robot.tcp of the cell";
+            let advice = "name it in robot.locked of the cell, or another link as robot.tcp";
             refuse("", "type", &found, "moving joints between base and TCP only", advice);
         }
     }
