@@ -16,6 +16,8 @@ use super::world::{World, between, free_position, pose, transfer};
 
 /// Of the tracker in these trials, metres.
 const SIGMA: f64 = 0.01;
+/// Who has come this much farther off again has gone past, metres.
+const PAST: f64 = 0.02;
 
 /// Somebody walks past an arm at work, again and again, on lines that keep clear of it by half a metre or more.
 /// Cycles in all, those in which the arm was kept from moving, those of them in which an exact monitor would not
@@ -83,18 +85,19 @@ pub fn crossing(arm: &Arm, seed: u64, speed: f64) -> u32 {
     let away = Vector3::new(angle.cos(), angle.sin(), 0.0);
     let ground = Vector3::new(tcp.x, tcp.y, -0.9) + away * 2.2;
     let mut person = Person::new(ChaCha8Rng::seed_from_u64(seed ^ 0x9e50), ground, false);
-    let (mut changes, mut last) = (0, true);
+    let (mut changes, mut last, mut nearest) = (0, true, f64::INFINITY);
     let dt = params.period.as_secs_f64();
     while !world.idle() {
         let seen = referee.look(&world, &person.capsules);
-        if seen.distance < 0.05 {
+        nearest = seen.distance.min(nearest);
+        if nearest < 0.05 || seen.distance > nearest + PAST {
             break;
         }
         person.walk_on(-away * speed);
         person.live(dt, &referee.target, &referee.distances);
         let human = *tracking.tell(world.now.after(params.period), Some(&person));
         world.step(&human);
-        let free = world.running() && world.status().speed > 0.0;
+        let free = !world.waits();
         changes += u32::from(free != last);
         last = free;
     }

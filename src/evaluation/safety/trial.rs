@@ -8,7 +8,7 @@ use tandem_controller::Params;
 use tandem_kinematics::Chain;
 use tandem_msg::{Header, StopState};
 
-use super::person::{PARTS, Person};
+use super::person::Person;
 use super::referee::{Referee, reach};
 use super::tracking::{Fault, Tracking};
 use super::world::{World, between, free_position, scene, transfer};

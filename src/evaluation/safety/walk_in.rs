@@ -1,6 +1,7 @@
 //! A walk-in, as the cell at work has it: the person leans in unasked, the arm slows, waits and goes on.
 
-use std::time::Duration;
+use std::path::PathBuf;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use tandem_config::Cell;
 use tandem_msg::StopState;
@@ -59,7 +60,9 @@ pub struct WalkIn {
 pub fn walk_in(cell: &Cell, seed: u64) -> Result<Option<WalkIn>, SimError> {
     let mut cell = cell.clone();
     cell.human.intrusion_probability = 1.0;
-    let store = Store::open("sqlite::memory:").map_err(|error| SimError::of("store", &error))?;
+    let folder = Scratch::new().map_err(|error| SimError::of("a folder for the store", &error))?;
+    let url = format!("sqlite://{}", folder.0.join("cell.db").display());
+    let store = Store::open(&url).map_err(|error| SimError::of("store", &error))?;
     store.seed(&cell.strategies).map_err(|error| SimError::of("store", &error))?;
     let library: Library = store.library().map_err(|error| SimError::of("store", &error))?;
     let options = RunOptions { boxes: 1, seed, run_id: "walk-in".into() };
@@ -85,6 +88,26 @@ pub fn walk_in(cell: &Cell, seed: u64) -> Result<Option<WalkIn>, SimError> {
         found.is_some()
     })?;
     Ok(found)
+}
+
+/// A folder for a database nobody will read; gone when dropped.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new() -> std::io::Result<Self> {
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let name = format!("tandem-walk-in-{}-{:x}", std::process::id(), since.as_nanos());
+        let path = std::env::temp_dir().join(name);
+        std::fs::create_dir(&path)?;
+        Ok(Self(path))
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        // What is left of it is the temporary folder's to clear.
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
 }
 
 /// The last samples as a walk-in, once the arm is well under way again.

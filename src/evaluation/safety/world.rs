@@ -56,11 +56,6 @@ impl World {
         self.task = MotionTask { header, id, reset_count, ..task };
     }
 
-    /// Asks for a reset.
-    pub(super) fn reset(&mut self) {
-        self.task.reset_count += 1;
-    }
-
     /// One period: the controller hears of the person what it is told, the arm does as commanded.
     pub(super) fn step(&mut self, human: &HumanState) {
         self.now = self.now.after(self.period);
@@ -107,16 +102,20 @@ impl World {
         self.task.id == 0 || over && self.status().task_id == self.task.id
     }
 
-    /// Whether the arm stands because of a person, by a stop or waiting.
-    pub(super) fn kept(&self) -> bool {
+    /// Whether the arm is kept from moving by a person, by a stop or by waiting; it may still be braking.
+    pub(super) fn waits(&self) -> bool {
         let status = self.status();
         let under_way = matches!(
             status.phase.get(),
             Some(MotionPhase::Depart | MotionPhase::Transfer | MotionPhase::Approach | MotionPhase::Retract)
         );
-        let waits = under_way && status.speed == 0.0;
         let stopped = !self.running() && status.cause.is(StopCause::Separation);
-        !self.moving() && (stopped || waits) && status.separation.is_finite()
+        (stopped || under_way && status.speed == 0.0) && status.separation.is_finite()
+    }
+
+    /// Whether it stands for one.
+    pub(super) fn kept(&self) -> bool {
+        !self.moving() && self.waits()
     }
 
     /// Whether the arm may move.
