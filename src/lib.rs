@@ -6,12 +6,14 @@
 pub mod bench;
 pub mod cli;
 pub mod doctor;
+pub mod evaluation;
 pub mod learning;
 pub mod live;
 pub mod lockstep;
 pub mod observe;
 pub mod perception;
 pub mod plant;
+pub mod plot;
 pub mod roles;
 pub mod strategy;
 pub mod supervisor;

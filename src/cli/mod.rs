@@ -7,6 +7,7 @@
 mod bench;
 mod check;
 mod doctor;
+mod eval;
 pub mod exit;
 mod journal;
 mod progress;
@@ -45,6 +46,8 @@ enum Command {
     Bench(bench::BenchArgs),
     /// What was done to each box, by whom, when
     Journal(journal::JournalArgs),
+    /// Measure what a cell does against what is demanded of it
+    Eval(eval::EvalArgs),
     /// Make the trained models that ship in config/models
     Train(train::TrainArgs),
     /// One role of a running cell (started by `tandem run`)
@@ -74,6 +77,7 @@ pub fn main() -> ExitCode {
         Command::Top(args) => top::top(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Journal(args) => journal::journal(&args),
+        Command::Eval(args) => eval::eval(&args),
         Command::Train(args) => train::train(&args),
         Command::Role(args) => role::role(&args),
         Command::BenchPeer(args) => bench::peer(&args),

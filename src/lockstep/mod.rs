@@ -16,7 +16,7 @@ use std::time::Duration;
 use tandem_bus::Identity;
 use tandem_config::Cell;
 use tandem_controller::Controller;
-use tandem_msg::{Coded, Role, Stamp};
+use tandem_msg::{Coded, MotionStatus, Role, Stamp};
 
 use crate::perception::Perception;
 use crate::plant::Plant;
@@ -34,6 +34,13 @@ const PATIENCE_PER_BOX: Duration = Duration::from_secs(1_800);
 /// Why a cell could not be built or run.
 #[derive(Debug)]
 pub struct SimError(String);
+
+impl SimError {
+    /// What a part of the cell said.
+    pub(crate) fn of(part: &str, error: &dyn fmt::Display) -> Self {
+        Self(format!("{part}: {error}"))
+    }
+}
 
 impl fmt::Display for SimError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -75,7 +82,7 @@ impl SimCell {
     /// # Errors
     /// A role that refuses its files or parameters.
     pub fn new(cell: &Cell, library: Library, options: RunOptions) -> Result<Self, SimError> {
-        let failed = |role: &str, error: &dyn fmt::Display| SimError(format!("{role}: {error}"));
+        let failed = SimError::of;
         let ports = MemoryPorts::new(identity(Role::Supervisor, 1, cell.hash));
         let seen_by = |role| ports.seen_by(identity(role, 1, cell.hash));
         let plant = Plant::new(cell, options.seed).map_err(|e| failed("plant", &e))?;
@@ -148,6 +155,11 @@ impl SimCell {
             }
         }
         Ok(None)
+    }
+
+    /// What the controller told everyone in its last cycle.
+    pub fn motion(&self) -> &MotionStatus {
+        self.controller.status()
     }
 
     /// Fastest joint as measured, rad/s.

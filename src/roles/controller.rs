@@ -56,6 +56,11 @@ impl<P: Ports> ControllerRole<P> {
         [self.arm.held().header, self.human.held().header, self.scene.held().header, self.task.held().header]
     }
 
+    /// What was told to everyone in the last cycle.
+    pub fn status(&self) -> &MotionStatus {
+        &self.outputs.status
+    }
+
     /// Messages that reached nobody because the bus had no room.
     pub fn unsent(&self) -> u64 {
         self.unsent

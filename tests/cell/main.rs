@@ -3,3 +3,4 @@
 mod assembly;
 mod faults;
 mod rig;
+mod safety;

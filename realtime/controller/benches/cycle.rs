@@ -1,7 +1,8 @@
 //! How long does one control cycle take? The whole of it: inputs judged, path followed, clearance, braking
-//! and separation checked, status written; 20 scene objects, a person of 12 capsules, a carried part.
+//! and separation checked, status written; 40 scene objects and a person of 10 capsules who is near enough to be
+//! measured at every look ahead, a carried part.
 //!
-//! `cargo bench -p tandem-controller --bench cycle`; run by `cargo test --benches` it takes a second.
+//! `cargo bench -p tandem-controller --bench cycle`, with `-- --json` one object a row; the tests run it briefly.
 #![allow(
     clippy::disallowed_types,
     clippy::disallowed_macros,
@@ -25,6 +26,16 @@ fn report(case: &str, mut samples: Vec<u64>) {
     }
     samples.sort_unstable();
     let at = |share: f64| samples[((samples.len() - 1) as f64 * share) as usize] as f64 * 1e-3;
+    if std::env::args().any(|argument| argument == "--json") {
+        println!(
+            "{{\"bench\":\"cycle\",\"case\":\"{case}\",\"cycles\":{},\"p50_us\":{:.2},\"p99_us\":{:.2},\"p999_us\":{:.2}}}",
+            samples.len(),
+            at(0.5),
+            at(0.99),
+            at(0.999)
+        );
+        return;
+    }
     println!(
         "{case:<12} {:>7} cycles   p50 {:>6.1} us   p99 {:>6.1} us   p99.9 {:>6.1} us   max {:>7.1} us",
         samples.len(),
@@ -40,9 +51,9 @@ fn main() {
     let short = !std::env::args().any(|argument| argument == "--bench");
     let cycles = if short { 20_000 } else { 200_000 };
     let mut cell = Cell::new();
-    while cell.scene.object_count < 20 {
+    while cell.scene.object_count < 40 {
         let index = cell.scene.object_count;
-        let along = f64::from(index) * 0.12 - 1.4;
+        let along = f64::from(index) * 0.06 - 1.4;
         cell.scene.objects[index as usize] = SceneObject {
             id: 100 + index,
             shape: Code::of([ShapeKind::Box, ShapeKind::Cylinder, ShapeKind::Sphere][index as usize % 3]),
@@ -51,9 +62,9 @@ fn main() {
         };
         cell.scene.object_count += 1;
     }
-    cell.human.capsule_count = 12;
+    cell.human.capsule_count = 10;
     cell.human.position_sigma = 0.005;
-    for (k, capsule) in cell.human.capsules.iter_mut().take(12).enumerate() {
+    for (k, capsule) in cell.human.capsules.iter_mut().take(10).enumerate() {
         let z = -0.8 + 0.13 * k as f64;
         *capsule = Capsule { ends: [[1.9, 0.2, z], [1.9, 0.35, z + 0.2]], radius: 0.09, velocity: [0.0; 3] };
     }

@@ -31,6 +31,8 @@ pub(crate) const LEVELS: [f64; 8] = [0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.8, 1.0];
 const REST_STOP: f64 = 0.12;
 /// Nobody farther off than this has ever mattered to an arm at rest, metres.
 pub(crate) const FAR: f64 = 2.0;
+/// A level this much below the present speed is a slower one.
+const SLOWER: f64 = 0.999;
 /// Somebody slower than this stands, m/s.
 const STANDING: f64 = 0.1;
 
@@ -214,8 +216,8 @@ impl Governor {
     }
 
     /// Chooses the level for the next cycle. With less than the reserve beyond what is owed by the stop from
-    /// here, the law goes over into that stop, which takes the separation owed down as fast as a person of
-    /// the credited speed can come nearer.
+    /// here, the law goes over to a slower level or to rest, and both begin as that stop does, which takes the
+    /// separation owed down as fast as a person of the credited speed can come nearer.
     pub(crate) fn choose(&mut self, now: Stamp, people: &People, halt: &Halt) -> usize {
         let velocity = halt.velocity;
         let standing = velocity <= 0.0;
@@ -233,7 +235,8 @@ impl Governor {
             let since = &mut self.room_since[index];
             *since = if room { since.or(Some(now)) } else { None };
             let up = since.is_some_and(|since| since.age_at(now) >= delay);
-            if !braking && (up || index < self.level && spare >= self.params.reserve) {
+            let slower = !braking || self.speeds[index] < SLOWER * velocity;
+            if slower && (up || index < self.level && spare >= self.params.reserve) {
                 best = index + 1;
             }
         }

@@ -205,6 +205,10 @@ impl StopMonitor {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
+mod explored;
+
+#[cfg(test)]
 mod tests {
     use super::*;
 

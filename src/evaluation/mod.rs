@@ -1,0 +1,3 @@
+//! Measuring a cell against what is demanded of it.
+
+pub mod safety;
