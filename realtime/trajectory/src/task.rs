@@ -150,7 +150,7 @@ impl Task {
         } else {
             0.0
         };
-        let allowed = SOUND * extent + input.tolerance + COLLECTED * speed * duration;
+        let allowed = SOUND * extent + input.tolerance + 8.0 * COLLECTED * speed * duration;
         extent.is_finite() && (reached - target.position).abs() <= allowed
     }
 }
