@@ -32,15 +32,26 @@
 //!    minimum; where the distance leaves the interval again lies a *blocked interval*.
 //! 3. The curves `P_high` and `P_low` are cut into monotone pieces by the zeros of their slope, which are
 //!    roots of quadratics. A crossing with the wanted distance is a root on one such piece, found by
-//!    Newton's iteration in a bracket. There is no case distinction by profile type, no quartic, and
+//!    Halley's iteration in a bracket. There is no case distinction by profile type, no quartic, and
 //!    no final test that a candidate could miss by a tolerance.
-//! 4. Joints that arrive together take the first duration possible for all (module `trajectory`).
+//! 4. Joints that arrive together take the first duration possible for all (module `trajectory`). Each is
+//!    asked for its first one not below what those before have agreed on, so most only say whether they
+//!    can take as long.
 //! 5. A motion for *any* possible duration is a mixture of the two extremal ones, with weights such
 //!    that the distance is right. It keeps every limit because both do. So synchronising needs no
 //!    search, and cannot fail.
 //!
-//! A start outside the limits gets a prefix that brings it back (module `brake`); a straight line
+//! Where only a velocity is wanted, one acceleration to wait at takes the place of the mixture (module
+//! `swing`). A start outside the limits gets a prefix that brings it back, and a target outside them, if
+//! allowed, a suffix ([`Input::target_outside`], module `brake`); a straight line
 //! through joint space is the problem of one joint with the tightest limits (module `straight`).
+//!
+//! # What is built on it
+//!
+//! [`Trajectory::stop`] and [`Stopping`] (where a joint stands if it brakes now), [`Cursor`] (times that
+//! only rise), [`Profile::extrema`] and [`Profile::first_time_at`], [`Input::minimum_durations`],
+//! [`Generator`] (a loop that calculates only what has changed), [`Route`] (through waypoints, with a budget
+//! of work), [`Tracker`] (a target that moves, one cycle behind).
 //!
 //! # Exactness
 //!
@@ -58,7 +69,9 @@
 //! |---|---|
 //! | passes over the joints until a shared duration is found | `2 + 3 N` |
 //! | pieces of an extremal curve | 16 |
-//! | steps of a root search | 2200, three to eight as a rule |
+//! | steps of a root search | 2200, two to four as a rule |
+//! | calculations of a [`Route`] | its budget and `2 (W + 1)` |
+//! | calculations of a [`Tracker`] | 48 a joint, two or three as a rule |
 //! | segments of a joint | 14, and the end state |
 #![no_std]
 

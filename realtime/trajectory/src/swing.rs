@@ -29,7 +29,7 @@ const TIE: f64 = 8.0 * f64::EPSILON;
 const LOOSE_TIE: f64 = 512.0 * TIE;
 
 /// Roundings of velocities up to the limit that a motion recomputed from its own output collects.
-const COLLECTED: f64 = 1024.0 * f64::EPSILON;
+pub(crate) const COLLECTED: f64 = 1024.0 * f64::EPSILON;
 
 /// The share of the last jerk's own work that its collected roundings may amount to.
 pub(crate) const ARRIVAL_SHARE: f64 = 1e-4;

@@ -72,7 +72,7 @@ fn a_noisy_closed_loop_arrives_in_spite_of_it() {
             let arrival = follow(&problem, cycle, 10.0 * size, || noise.uniform(-size, size));
             let late = (arrival.arrived - arrival.planned).abs();
             worst = worst.max(late);
-            let allowed = cycle + 2.0 * (32.0 * 10.0 * size / problem.limits.jerk_max).cbrt();
+            let allowed = cycle + 3.0 * (32.0 * 10.0 * size / problem.limits.jerk_max).cbrt();
             assert!(late <= allowed, "{index}, noise {size:e}: late by {late}, allowed {allowed} {problem:?}");
         }
         println!("noise {size:e}: latest by {worst:.1e} s");
@@ -122,4 +122,11 @@ fn a_motion_that_ends_within_the_tolerance_is_sound() {
     input.limits[0] = tandem_trajectory::Limits::symmetric(7.27137832088671, 1.6299459557666829, 1.1292776870960957);
     let trajectory = Trajectory::calculate(&input).expect("valid");
     assert_eq!(trajectory.at(trajectory.duration()), input.target);
+    // The roundings of velocities of 7.1, collected, in a last moment of far smaller ones.
+    input = Input { tolerance: [0.0], ..input };
+    input.start[0] =
+        State { position: 1.6329507030918264e-8, velocity: -1.5325923037765396e-5, acceleration: 0.009589345052286015 };
+    input.target[0] = State::at_rest(0.0);
+    input.limits[0] = tandem_trajectory::Limits::symmetric(7.1, 4.9, 3.0);
+    Trajectory::calculate(&input).expect("valid");
 }
