@@ -41,4 +41,4 @@ pub use product::{Capture, Part, Product};
 pub use robot::{LinkInertia, Robot, RobotOptions};
 pub use strategy::{AssemblyMode, Focus, Form, Range, ReferenceRow, Step, StrategyRow, Subject, Verb};
 pub use supervisor::{Capability, Supervisor, Timeouts};
-pub use timing::{Policy, Realtime, Schedule, Timing};
+pub use timing::{Overrun, OverrunPolicy, Policy, Realtime, Schedule, Timing};

@@ -6,6 +6,10 @@ use tandem_msg::{Coded, Role};
 
 const PERIOD: Bound = bound("period_us", "us", 250.0, 1_000_000.0);
 const PHASE: Bound = bound("phase_us", "us", 0.0, 999_999.0);
+const LIMIT: Bound = bound("overrun_limit", "", 1.0, 1_000_000.0);
+const OVERRUN: &str = "overrun";
+const SPIN_MAX: Bound = bound("spin_max_us", "us", 1.0, 1_000.0);
+const DMA_LATENCY: Bound = bound("cpu_dma_latency_us", "us", 0.0, 1_000_000.0);
 const PRIORITY: Bound = bound("priority", "", 1.0, 98.0);
 const CPU: Bound = bound("cpu", "", 0.0, 1023.0);
 
@@ -16,6 +20,61 @@ pub struct Schedule {
     pub period: Duration,
     /// Offset on the grid, below the period.
     pub phase: Duration,
+    /// What is done about grid points that pass while the role is busy.
+    pub overrun: Overrun,
+}
+
+/// Policies for grid points that pass while a role is busy.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum OverrunPolicy {
+    /// They are missed.
+    Skip,
+    /// They are run late, one after another.
+    CatchUp,
+    /// They are missed, and the role runs at a fraction of its rate until it keeps its time.
+    Degrade,
+    /// They are missed, and too many of them end the role's process, which is then started anew.
+    Stop,
+}
+
+impl Coded for OverrunPolicy {
+    const ALL: &'static [Self] = &[Self::Skip, Self::CatchUp, Self::Degrade, Self::Stop];
+    fn code(self) -> u32 {
+        self as u32
+    }
+    fn name(self) -> &'static str {
+        match self {
+            Self::Skip => "skip",
+            Self::CatchUp => "catch_up",
+            Self::Degrade => "degrade",
+            Self::Stop => "stop",
+        }
+    }
+}
+
+/// A policy with its limit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Overrun {
+    /// What is done.
+    pub policy: OverrunPolicy,
+    /// `CatchUp`: late cycles in a row at most. `Degrade`: divisor of the rate at most. `Stop`: missed points the
+    /// leaky bucket holds. Not used by `Skip`.
+    pub limit: u32,
+}
+
+impl Overrun {
+    const SKIP: Self = Self { policy: OverrunPolicy::Skip, limit: 0 };
+
+    fn read(table: &Table<'_>) -> Self {
+        match table.named_if(OVERRUN).unwrap_or(OverrunPolicy::Skip) {
+            OverrunPolicy::Skip if table.has(LIMIT.key) => {
+                table.refuse(LIMIT.key, "a limit", "none", "nothing is limited when points are skipped: remove it");
+                Self::SKIP
+            }
+            OverrunPolicy::Skip => Self::SKIP,
+            policy => Self { policy, limit: table.whole(&LIMIT) },
+        }
+    }
 }
 
 /// The schedule of each role.
@@ -47,14 +106,18 @@ impl Timing {
         let table = cell.table("timing");
         let role = |name: &str| {
             let Some(table) = table.as_ref().and_then(|table| table.table(name)) else {
-                return Schedule { period: Duration::from_millis(1), phase: Duration::ZERO };
+                return Schedule { period: Duration::from_millis(1), phase: Duration::ZERO, overrun: Overrun::SKIP };
             };
             let (period, phase) = (table.whole(&PERIOD), table.whole(&PHASE));
             if phase >= period {
                 let allowed = format!("0..={} us", period - 1);
                 table.refuse(PHASE.key, &format!("{phase} us"), &allowed, "keep the phase below period_us");
             }
-            Schedule { period: Duration::from_micros(period.into()), phase: Duration::from_micros(phase.into()) }
+            Schedule {
+                period: Duration::from_micros(period.into()),
+                phase: Duration::from_micros(phase.into()),
+                overrun: Overrun::read(&table),
+            }
         };
         Self {
             plant: role("plant"),
@@ -97,15 +160,26 @@ pub struct Realtime {
     pub priority: [Option<u8>; 4],
     /// Processor each role is pinned to, if any.
     pub cpu: [Option<u16>; 4],
+    /// Longest time each role may spin before a grid point instead of sleeping; zero: it sleeps to the end.
+    pub spin_max: [Duration; 4],
+    /// What `/dev/cpu_dma_latency` is to be held at, microseconds, if at all.
+    pub dma_latency_us: Option<u32>,
 }
 
 impl Realtime {
     pub(crate) fn read(cell: &Table<'_>) -> Self {
-        let mut out = Self { policy: Policy::BestEffort, priority: [None; 4], cpu: [None; 4] };
+        let mut out = Self {
+            policy: Policy::BestEffort,
+            priority: [None; 4],
+            cpu: [None; 4],
+            spin_max: [Duration::ZERO; 4],
+            dma_latency_us: None,
+        };
         let Some(table) = cell.table("realtime") else {
             return out;
         };
         out.policy = table.named("policy").unwrap_or(Policy::BestEffort);
+        out.dma_latency_us = table.has(DMA_LATENCY.key).then(|| table.whole(&DMA_LATENCY));
         for &role in Role::ALL {
             if !table.has(role.name()) {
                 continue;
@@ -116,6 +190,9 @@ impl Realtime {
             let index = role.code() as usize;
             out.priority[index] = table.has(PRIORITY.key).then(|| table.whole(&PRIORITY) as u8);
             out.cpu[index] = table.has(CPU.key).then(|| table.whole(&CPU) as u16);
+            if table.has(SPIN_MAX.key) {
+                out.spin_max[index] = Duration::from_micros(table.whole(&SPIN_MAX).into());
+            }
         }
         out
     }

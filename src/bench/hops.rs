@@ -81,7 +81,7 @@ fn age(input: &str, before: &Snapshot, after: &Snapshot) -> hdrhistogram::Histog
 /// Reads each state of the arm as it is published, between the cycles of plant and controller. Of each: from the sensor
 /// stamp its command was computed from to the instant it was applied. The second: states with no command in force.
 fn listen(cell: &Seat, sensing: &Grid, time: Duration) -> Result<(hdrhistogram::Histogram<u64>, u64), BenchError> {
-    let node = cell.join()?;
+    let node = cell.join();
     let mut arm = node.latest::<JointState>(service::ARM_STATE)?;
     let mut whole = histogram();
     let (mut last, mut without) = (0, 0);

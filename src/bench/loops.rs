@@ -21,7 +21,7 @@ const WARM_UP: u64 = 20;
 
 /// What the measured threads ask for.
 pub(super) fn wish(cpu: Option<u32>) -> Wish {
-    Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu, lock_memory: true }
+    Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu, lock_memory: true, dma_latency_us: None }
 }
 
 /// The processor the loops run on: the one asked for, or the last, which gets the fewest interrupts.

@@ -79,7 +79,7 @@ fn reading(file: &Path) -> Result<Duration, BenchError> {
 fn kill(file: &Path, seed: u64) -> Result<Kill, BenchError> {
     let cell = LiveCell::start(file, seed)?;
     let statistics = cell.seat().statistics(Role::Controller)?;
-    let node = cell.seat().join()?;
+    let node = cell.seat().join();
     let mut arm = node.latest::<JointState>(service::ARM_STATE)?;
     let mut command = node.latest::<JointCommand>(service::ARM_COMMAND)?;
     // Both are heard before anything is killed.

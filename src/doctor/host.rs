@@ -106,7 +106,13 @@ fn free(mount: &Path) -> Option<u64> {
 
 /// Tried on a thread of its own, which takes the setting with it.
 fn granted() -> Option<Granted> {
-    let wish = Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu: None, lock_memory: false };
+    let wish = Wish {
+        policy: Policy::BestEffort,
+        priority: Some(PRIORITY),
+        cpu: None,
+        lock_memory: false,
+        dma_latency_us: None,
+    };
     std::thread::spawn(move || acquire(&wish).ok()).join().ok().flatten()
 }
 

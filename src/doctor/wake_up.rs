@@ -22,7 +22,13 @@ pub(super) struct WakeUp {
 }
 
 pub(super) fn trial() -> Option<WakeUp> {
-    let wish = Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu: None, lock_memory: false };
+    let wish = Wish {
+        policy: Policy::BestEffort,
+        priority: Some(PRIORITY),
+        cpu: None,
+        lock_memory: false,
+        dma_latency_us: None,
+    };
     acquire(&wish).ok()?;
     let mut rate = FixedRate::new(Grid::new(PERIOD, Duration::ZERO).ok()?, Monotonic);
     for _ in 0..CYCLES {

@@ -11,7 +11,7 @@ use tandem_config::Cell;
 use tandem_controller::Controller;
 use tandem_msg::{Coded, Role};
 
-use super::shell::{Leaving, Shell};
+use super::shell::Shell;
 use super::{LiveError, rundir, signals};
 use crate::perception::Perception;
 use crate::plant::Plant;
@@ -39,7 +39,7 @@ pub struct RoleArgs {
     pub seed: u64,
 }
 
-/// Runs one role until SIGTERM, or until its supervisor is gone.
+/// Runs one role until SIGTERM; the kernel kills it when its supervisor is gone.
 ///
 /// # Errors
 /// A file, parameter or model is refused, or the bus cannot be joined.
@@ -47,20 +47,17 @@ pub fn role(args: &RoleArgs) -> Result<(), LiveError> {
     signals::listen().map_err(LiveError::Signals)?;
     let cell = Cell::load(&args.cell, args.product.as_deref()).map_err(LiveError::Config)?;
     let instance = rundir::instance_at(&args.instance)?;
-    let left = match args.role {
+    match args.role {
         Role::Plant => plant(args, &cell, &instance),
         Role::Perception => perception(args, &cell, &instance),
         Role::Controller => controller(args, &cell, &instance),
         Role::Supervisor => Err(LiveError::NoSuchRole),
-    }?;
-    match left {
-        Leaving::Asked | Leaving::Orphaned => Ok(()),
     }
 }
 
-fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {
+fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), LiveError> {
     let plant = Plant::new(cell, args.seed).map_err(refused(Role::Plant))?;
-    let node = join(args.role, args.epoch, cell, instance)?;
+    let node = join(args.role, args.epoch, cell, instance);
     let (mut role, camera) = PlantRole::open_apart(&node, plant)?;
     thread::scope(|scope| {
         let (ready, opened) = mpsc::channel();
@@ -68,9 +65,8 @@ fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, L
         scope.spawn(move || {
             let Some(camera) = camera else { return };
             // Ports belong to the thread of their node, so the camera has its own.
-            let joined = join(args.role, args.epoch, cell, instance);
-            let cloud = joined.and_then(|node| Ok(camera.open(&node)?));
-            let (cloud, outcome) = match cloud {
+            let node = join(args.role, args.epoch, cell, instance);
+            let (cloud, outcome) = match camera.open(&node) {
                 Ok(cloud) => (Some(cloud), Ok(())),
                 Err(error) => (None, Err(error)),
             };
@@ -88,37 +84,37 @@ fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, L
         });
         // Ends the camera.
         drop(role);
-        Ok(left)
+        left
     })
 }
 
-fn perception(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {
+fn perception(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), LiveError> {
     let perception = Perception::load(&cell.perception.model).map_err(refused(Role::Perception))?;
-    let node = join(args.role, args.epoch, cell, instance)?;
+    let node = join(args.role, args.epoch, cell, instance);
     let mut role = PerceptionRole::open(&node, perception)?;
     let shell = Shell::new(cell, instance, args.role, args.epoch)?;
-    Ok(shell.run(|now| {
+    shell.run(|now| {
         role.cycle(now);
         role.heard()
-    }))
+    })
 }
 
-fn controller(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<Leaving, LiveError> {
+fn controller(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), LiveError> {
     let controller = Controller::new(cell.robot.chain, cell.robot.body, cell.controller);
     let controller = controller.map_err(refused(Role::Controller))?;
-    let node = join(args.role, args.epoch, cell, instance)?;
+    let node = join(args.role, args.epoch, cell, instance);
     let mut role = ControllerRole::open(&node, controller)?;
     let shell = Shell::new(cell, instance, args.role, args.epoch)?;
-    Ok(shell.run(|now| {
+    shell.run(|now| {
         role.cycle(now);
         role.heard()
-    }))
+    })
 }
 
 /// A place on the bus for one incarnation of a role.
-pub(super) fn join(role: Role, epoch: u64, cell: &Cell, instance: &Instance) -> Result<Node, LiveError> {
+pub(super) fn join(role: Role, epoch: u64, cell: &Cell, instance: &Instance) -> Node {
     let identity = Identity { role: role.name().to_owned(), epoch, config_hash: cell.hash };
-    Ok(Node::open(instance, identity, JOINING)?)
+    Node::new(instance, identity, JOINING)
 }
 
 fn refused<E: Into<Box<dyn Error + Send + Sync>>>(role: Role) -> impl FnOnce(E) -> LiveError {

@@ -43,6 +43,12 @@ pub enum LiveError {
         /// What is missing.
         denied: Denied,
     },
+    /// A loop misses more of its cycles than the cell file allows.
+    #[error("timing.{}: more grid points were missed than overrun_limit allows; the loop is left", role.name())]
+    Overloaded {
+        /// The role.
+        role: Role,
+    },
     /// The file of a loop's statistics cannot be made.
     #[error("statistics {path}: {cause}; is /dev/shm mounted and not full? `tandem doctor` says more")]
     Statistics {

@@ -23,6 +23,7 @@ mod child;
 mod error;
 mod health;
 mod journal;
+mod pulse;
 mod rollcall;
 mod rundir;
 mod shell;
@@ -47,6 +48,7 @@ use tandem_config::Cell;
 use crate::strategy::Library;
 use crate::strategy::store::Store;
 use crate::supervisor::{Event, RunOptions, Supervisor};
+use child::CHILDREN;
 use rundir::RunDir;
 use spawn::Plan;
 use supervise::Watch;
@@ -79,6 +81,10 @@ pub fn run(
         product: product.map(str::to_owned),
         run: run_dir.path().to_owned(),
         seed: options.seed,
+        beats: CHILDREN.map(|role| {
+            let realtime = cell.realtime.priority[role as usize].is_some();
+            realtime.then(|| cell.timing.of(role).period)
+        }),
     };
     let (report, reports) = mpsc::channel();
     let (warden, orders) = Warden::new(plan, run_dir.instance().clone(), report).map_err(LiveError::Threads)?;

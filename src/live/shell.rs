@@ -7,34 +7,22 @@
 use std::io::{self, Write as _};
 use std::time::Duration;
 
-use rustix::process::{Pid, getppid};
 use tandem_bus::Instance;
-use tandem_config::{Cell, Policy};
+use tandem_config::{Cell, OverrunPolicy, Policy};
+use tandem_cycle::guard::{self, Watch};
 use tandem_cycle::setup::{self, Granted, Wish};
 use tandem_cycle::stats::Writer;
-use tandem_cycle::{Clock, FixedRate, Grid, Monotonic};
+use tandem_cycle::{Clock, FixedRate, Grid, Monotonic, Overrun, Pace, Tick};
 use tandem_msg::{Coded, Header, Role, Stamp};
 
 use super::{LiveError, signals, statistics};
 use crate::roles::service;
 
-/// Between two looks at who the parent is.
-const PARENT_CHECK: Duration = Duration::from_millis(100);
-
-/// Why a loop was left.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Leaving {
-    /// A signal asked for it.
-    Asked,
-    /// The supervisor's process is gone.
-    Orphaned,
-}
-
 /// One role's loop.
 pub(super) struct Shell {
     rate: FixedRate<Monotonic, Writer>,
-    parent: Option<Pid>,
-    check_at: Stamp,
+    role: Role,
+    watch: Watch,
 }
 
 impl Shell {
@@ -48,38 +36,56 @@ impl Shell {
         let now = Monotonic.now();
         let record = Writer::create(&path, role, epoch, &grid, service::inputs(role), &granted, now);
         let record = record.map_err(|cause| LiveError::Statistics { path, cause })?;
-        Ok(Self { rate: FixedRate::recording_in(record, grid, Monotonic), parent: getppid(), check_at: Stamp(0) })
+        let pace = Pace { overrun: overrun(schedule.overrun), spin_max: spin_max(cell, role, &granted) };
+        Ok(Self { role, rate: FixedRate::recording_in(record, grid, Monotonic, pace), watch: Watch::default() })
     }
 
-    /// Waits for the next grid point: the "now" of the cycle.
-    pub(super) fn wait(&mut self) -> Stamp {
-        self.rate.wait().now
-    }
-
-    /// Records how old the inputs were that the cycle at `now` has read, by their headers.
-    pub(super) fn heard(&self, now: Stamp, inputs: &[Header]) {
-        for (index, header) in inputs.iter().enumerate().filter(|(_, header)| header.heard()) {
-            self.rate.recorder().age(index, now.0.saturating_sub(header.stamp.0));
+    /// Waits for the next grid point and runs `cycle` for it, which answers with what it has heard.
+    ///
+    /// # Errors
+    /// The loop cannot keep its time, and the cell file says that it is to be left.
+    pub(super) fn step<const N: usize>(&mut self, cycle: impl FnOnce(Stamp) -> [Header; N]) -> Result<(), LiveError> {
+        let Tick { now, overloaded, .. } = self.rate.wait();
+        let (heard, calls) = guard::counted(|| cycle(now));
+        let statistics = self.rate.recorder();
+        for (index, header) in heard.iter().enumerate().filter(|(_, header)| header.heard()) {
+            statistics.age(index, now.0.saturating_sub(header.stamp.0));
         }
+        statistics.guarded(self.watch.cycle(now, calls));
+        if overloaded { Err(LiveError::Overloaded { role: self.role }) } else { Ok(()) }
     }
 
-    /// Runs `cycle` on every grid point until there is a reason to leave. It answers with what it has heard.
-    pub(super) fn run<const N: usize>(mut self, mut cycle: impl FnMut(Stamp) -> [Header; N]) -> Leaving {
-        loop {
-            let now = self.wait();
-            let heard = cycle(now);
-            self.heard(now, &heard);
-            if now >= self.check_at {
-                self.check_at = now.after(PARENT_CHECK);
-                if getppid() != self.parent {
-                    return Leaving::Orphaned;
-                }
-            }
-            if signals::asked() > 0 {
-                return Leaving::Asked;
-            }
+    /// Runs `cycle` on every grid point until a signal asks for the end. When the supervisor is
+    /// gone, the kernel ends the process.
+    ///
+    /// # Errors
+    /// As [`Shell::step`].
+    pub(super) fn run<const N: usize>(mut self, mut cycle: impl FnMut(Stamp) -> [Header; N]) -> Result<(), LiveError> {
+        while signals::asked() == 0 {
+            self.step(&mut cycle)?;
         }
+        Ok(())
     }
+}
+
+fn overrun(asked: tandem_config::Overrun) -> Overrun {
+    match asked.policy {
+        OverrunPolicy::Skip => Overrun::Skip,
+        OverrunPolicy::CatchUp => Overrun::CatchUp { in_a_row_max: asked.limit },
+        OverrunPolicy::Degrade => Overrun::Degrade { divisor_max: asked.limit },
+        OverrunPolicy::Stop => Overrun::Stop { bucket: asked.limit },
+    }
+}
+
+/// How long a role may spin. Without SCHED_FIFO others would be run in between all the same; and one processor is
+/// left to those that do not spin: those of the highest priority come first.
+fn spin_max(cell: &Cell, role: Role, granted: &Granted) -> Duration {
+    let spins = |other: &Role| !cell.realtime.spin_max[*other as usize].is_zero();
+    let rank = |other: Role| (cell.realtime.priority[other as usize], other);
+    let before = Role::ALL.iter().filter(|other| spins(other) && rank(**other) > rank(role)).count();
+    let processors = std::thread::available_parallelism().map_or(1, usize::from);
+    let allowed = granted.priority.is_some() && before + 1 < processors;
+    if allowed { cell.realtime.spin_max[role as usize] } else { Duration::ZERO }
 }
 
 /// What the host grants the calling thread for its role.
@@ -95,6 +101,7 @@ fn granted(cell: &Cell, role: Role) -> Result<Granted, LiveError> {
         cpu: cell.realtime.cpu[index].map(u32::from),
         // The supervisor shares its process with the store and the console, which may take their time.
         lock_memory: priority.is_some() && role != Role::Supervisor,
+        dma_latency_us: priority.and(cell.realtime.dma_latency_us),
     };
     setup::acquire(&wish).map_err(|denied| LiveError::Denied { role, denied })
 }

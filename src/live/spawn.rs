@@ -30,6 +30,8 @@ pub(super) struct Plan {
     pub(super) run: PathBuf,
     /// The run's seed.
     pub(super) seed: u64,
+    /// Period of each realtime role, in the order of `CHILDREN`: it is looked after by its heartbeat.
+    pub(super) beats: [Option<Duration>; 3],
 }
 
 /// The last lines a process wrote to standard error.

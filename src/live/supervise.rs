@@ -61,47 +61,60 @@ struct Ending {
 impl Watch<'_> {
     /// Runs until the end.
     pub(super) fn run(mut self, supervisor: Supervisor) -> Result<Ended, LiveError> {
-        let node = join(Role::Supervisor, 1, self.cell, self.instance)?;
+        let node = join(Role::Supervisor, 1, self.cell, self.instance);
         let mut role = SupervisorRole::open(&node, supervisor)?;
         let mut roles = RollCall::new(self.cell);
         let mut shell = Shell::new(self.cell, self.instance, Role::Supervisor, 1)?;
         let mut asked_since = None;
         let mut ending: Option<Ending> = None;
         loop {
-            let now = shell.wait();
-            let [plant, perception, controller, ..] = role.heard();
-            roles.call(now, &self.reports, &[plant, perception, controller], self.orders);
-            if let Some(error) = roles.failed_to_start() {
-                return Err(error);
-            }
-            if signals::asked() > 0 {
-                asked_since.get_or_insert(now);
-            }
-            let around = Surroundings {
-                roles: roles.surroundings(),
-                journal_committed: self.journal.durable(),
-                halt: asked_since.is_some() || ending.is_some(),
-            };
-            let outputs = role.cycle(now, &around);
-            for event in outputs.events.drain(..) {
-                // Without a listener the run goes on all the same.
-                let _ = self.events.send(event);
-            }
-            self.journal.write(std::mem::take(&mut outputs.journal));
-            if let Some(outcome) = outputs.finished.take() {
-                ending.get_or_insert(Ending { outcome, since: now });
-            } else if ending.is_none() {
-                ending = overdue(now, asked_since, &roles).map(|outcome| Ending { outcome, since: now });
-            }
-            shell.heard(now, &role.heard());
-            if let Some(end) = &ending
-                && self.may_leave(now, end, &role)
-            {
-                let loops = self.loops();
-                let summary = role.summary();
-                return Ok(Ended { outcome: end.outcome.clone(), summary, loops, restarts: roles.restarts() });
+            let mut left = None;
+            shell.step(|now| {
+                left = self.cycle(now, &mut role, &mut roles, &mut asked_since, &mut ending);
+                role.heard()
+            })?;
+            if let Some(outcome) = left {
+                let outcome = outcome?;
+                return Ok(Ended { outcome, summary: role.summary(), loops: self.loops(), restarts: roles.restarts() });
             }
         }
+    }
+
+    /// One cycle; answers when the run is over.
+    fn cycle(
+        &mut self,
+        now: Stamp,
+        role: &mut SupervisorRole<Node>,
+        roles: &mut RollCall,
+        asked_since: &mut Option<Stamp>,
+        ending: &mut Option<Ending>,
+    ) -> Option<Result<Outcome, LiveError>> {
+        let [plant, perception, controller, ..] = role.heard();
+        roles.call(now, &self.reports, &[plant, perception, controller], self.orders);
+        if let Some(error) = roles.failed_to_start() {
+            return Some(Err(error));
+        }
+        if signals::asked() > 0 {
+            asked_since.get_or_insert(now);
+        }
+        let around = Surroundings {
+            roles: roles.surroundings(),
+            journal_committed: self.journal.durable(),
+            halt: asked_since.is_some() || ending.is_some(),
+        };
+        let outputs = role.cycle(now, &around);
+        for event in outputs.events.drain(..) {
+            // Without a listener the run goes on all the same.
+            let _ = self.events.send(event);
+        }
+        self.journal.write(std::mem::take(&mut outputs.journal));
+        if let Some(outcome) = outputs.finished.take() {
+            ending.get_or_insert(Ending { outcome, since: now });
+        } else if ending.is_none() {
+            *ending = overdue(now, *asked_since, roles).map(|outcome| Ending { outcome, since: now });
+        }
+        let end = ending.as_ref()?;
+        self.may_leave(now, end, role).then(|| Ok(end.outcome.clone()))
     }
 
     /// Statistics of the loops, as far as they can be read.

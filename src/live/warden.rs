@@ -1,8 +1,10 @@
 //! Starts the role processes, sees them end, and starts them anew.
 //!
 //! One thread, which waits on a pidfd of every child, so that a death is noticed
-//! when it happens and never in the supervisor's cycle. Cleaning up after the dead
-//! on the bus and starting the successor take tens of milliseconds, and happen here.
+//! when it happens and never in the supervisor's cycle. Between deaths it takes the
+//! pulse of the realtime loops: one that is stopped or spins without a cycle is
+//! killed within ten of its periods. The successor is started before the dead one's
+//! place on the bus is cleaned up: there is room for both.
 //!
 //! **Invariant:** a role process never outlives this thread: the kernel kills it
 //! when the thread that started it ends (`PR_SET_PDEATHSIG`), whatever the reason.
@@ -19,11 +21,14 @@ use std::time::{Duration, Instant};
 use rustix::event::{EventfdFlags, PollFd, PollFlags, Timespec, eventfd, poll};
 use rustix::process::{Pid, PidfdFlags, Signal, pidfd_open, pidfd_send_signal};
 use tandem_bus::Instance;
+use tandem_cycle::stats::Reader;
 use tandem_msg::{Coded, Role};
 
 use super::child::CHILDREN;
 use super::health::Loss;
+use super::pulse::Pulse;
 use super::spawn::{LastWords, Plan, spawn};
+use super::statistics;
 
 /// Restarts in a row before a role is given up.
 const RESTARTS_MAX: u32 = 5;
@@ -35,6 +40,9 @@ const HEALTHY: Duration = Duration::from_secs(30);
 const CLEANING: Duration = Duration::from_millis(500);
 /// Between asking a process to end and killing it.
 const GRACE: Duration = Duration::from_secs(2);
+
+/// Between two looks at the heartbeats; no more than that is added to the silence of a loop.
+const BEAT: Duration = Duration::from_millis(1);
 
 /// Exit code of a process that refuses its configuration; see [`super::LiveError::exit_code`].
 const CONFIG_REFUSED: i32 = 3;
@@ -102,6 +110,8 @@ struct Place {
     /// Restarts in a row.
     restarts: u32,
     start_at: Option<Instant>,
+    /// Period of its loop, when it is realtime.
+    beat: Option<Duration>,
 }
 
 struct Running {
@@ -109,6 +119,11 @@ struct Running {
     pidfd: OwnedFd,
     words: LastWords,
     since: Instant,
+    /// Where it counts its cycles, once it does.
+    statistics: Option<Reader>,
+    pulse: Option<Pulse>,
+    /// It was killed for its silence.
+    silent: bool,
 }
 
 /// Owns the role processes of one cell.
@@ -132,8 +147,12 @@ impl Warden {
     ) -> Result<(Self, Orders), std::io::Error> {
         let wake = Arc::new(eventfd(0, EventfdFlags::CLOEXEC | EventfdFlags::NONBLOCK)?);
         let (sender, orders) = mpsc::channel();
-        let places =
-            CHILDREN.map(|role| Place { role, running: None, epoch: 0, restarts: 0, start_at: Some(Instant::now()) });
+        let place = |(role, beat)| {
+            let start_at = Some(Instant::now());
+            Place { role, running: None, epoch: 0, restarts: 0, start_at, beat }
+        };
+        let mut beats = plan.beats.into_iter();
+        let places = CHILDREN.map(|role| place((role, beats.next().flatten())));
         let told = Orders { sender, wake: Arc::clone(&wake) };
         Ok((Self { plan, instance, places, orders, wake, reports, ending: None }, told))
     }
@@ -145,6 +164,7 @@ impl Warden {
             self.wait();
             self.obey();
             self.reap();
+            self.take_pulses();
             if let Some(patience_ends) = self.ending {
                 if self.places.iter().all(|place| place.running.is_none()) {
                     return;
@@ -162,7 +182,8 @@ impl Warden {
             place.start_at = None;
             place.epoch += 1;
             let role = place.role;
-            match spawn(&self.plan, role, place.epoch).and_then(|(child, words)| Running::new(child, words)) {
+            match spawn(&self.plan, role, place.epoch).and_then(|(child, words)| Running::new(child, words, place.beat))
+            {
                 Ok(running) => {
                     place.running = Some(running);
                     let _ = self.reports.send(Report::Started { role, epoch: place.epoch });
@@ -178,7 +199,10 @@ impl Warden {
 
     /// Until a process ends, an order comes or a start is due.
     fn wait(&self) {
-        let due = self.places.iter().filter_map(|place| place.start_at).chain(self.ending).min();
+        let beating =
+            self.places.iter().any(|place| place.running.as_ref().is_some_and(|running| running.pulse.is_some()));
+        let beat = beating.then(|| Instant::now() + BEAT);
+        let due = self.places.iter().filter_map(|place| place.start_at).chain(self.ending).chain(beat).min();
         // Once patience has ended the killed are waited for, without spinning.
         let left = due.map(|at| at.saturating_duration_since(Instant::now()).max(Duration::from_millis(1)));
         let timeout =
@@ -211,16 +235,35 @@ impl Warden {
         }
     }
 
+    /// Kills the realtime loops that are stopped or spin.
+    fn take_pulses(&mut self) {
+        if self.ending.is_some() {
+            return;
+        }
+        let now = Instant::now();
+        for place in &mut self.places {
+            let Some(running) = &mut place.running else { continue };
+            let Some(pulse) = &mut running.pulse else { continue };
+            if running.statistics.is_none() {
+                running.statistics = Reader::open(&statistics::file(&self.instance, place.role)).ok();
+            }
+            let Some(statistics) = &running.statistics else { continue };
+            if !running.silent && pulse.is_lost(statistics, place.epoch, running.child.id(), now) {
+                running.silent = true;
+                place.signal(Signal::KILL);
+            }
+        }
+    }
+
     fn reap(&mut self) {
         for index in 0..self.places.len() {
-            let Some((status, words)) = self.places[index].take_ended() else { continue };
+            let Some((status, dead)) = self.places[index].take_ended() else { continue };
             let role = self.places[index].role;
             if self.ending.is_some() {
                 continue;
             }
-            let loss = loss_of(status);
-            let _ = self.reports.send(Report::Lost { role, loss, last_words: words.read() });
-            self.instance.clean_dead(CLEANING);
+            let loss = if dead.silent { Loss::Silent } else { loss_of(status) };
+            let _ = self.reports.send(Report::Lost { role, loss, last_words: dead.words.read() });
             let place = &mut self.places[index];
             // A file or setting that was refused will be refused again.
             let refused = loss == Loss::Exited { code: CONFIG_REFUSED };
@@ -230,6 +273,8 @@ impl Warden {
                 place.start_at = Some(Instant::now() + pause(place.restarts));
                 place.restarts += 1;
             }
+            self.start_due();
+            self.instance.clean_dead(CLEANING);
         }
     }
 }
@@ -243,22 +288,26 @@ impl Place {
     }
 
     /// The process, if it has ended.
-    fn take_ended(&mut self) -> Option<(ExitStatus, LastWords)> {
+    fn take_ended(&mut self) -> Option<(ExitStatus, Running)> {
         let running = self.running.as_mut()?;
         let status = running.child.try_wait().ok().flatten()?;
         let running = self.running.take()?;
         if running.since.elapsed() >= HEALTHY {
             self.restarts = 0;
         }
-        Some((status, running.words))
+        Some((status, running))
     }
 }
 
 impl Running {
-    fn new(mut child: Child, words: LastWords) -> std::io::Result<Self> {
+    fn new(mut child: Child, words: LastWords, beat: Option<Duration>) -> std::io::Result<Self> {
         let pid = Pid::from_child(&child);
         match pidfd_open(pid, PidfdFlags::empty()) {
-            Ok(pidfd) => Ok(Self { child, pidfd, words, since: Instant::now() }),
+            Ok(pidfd) => {
+                let since = Instant::now();
+                let pulse = beat.map(|period| Pulse::new(period, since));
+                Ok(Self { child, pidfd, words, since, statistics: None, pulse, silent: false })
+            }
             Err(cause) => {
                 child.kill()?;
                 child.wait()?;

@@ -24,6 +24,8 @@ use crate::roles::service;
 
 /// How long an observer tries to join the bus.
 const JOINING: Duration = Duration::from_secs(2);
+/// How long the first word of a role is waited for.
+const FIRST_WORD: Duration = Duration::from_millis(100);
 /// What is called recent.
 const RECENT: Duration = Duration::from_secs(1);
 
@@ -81,10 +83,15 @@ impl Observer {
         let (file, product) = cell_file(&loops).ok_or_else(unknown)?;
         let cell = Cell::load(&file, product.as_deref()).map_err(ObserveError::Config)?;
         let identity = Identity { role: "observer".to_owned(), epoch: 1, config_hash: cell.hash };
-        let node = Node::open(running.instance(), identity, JOINING)?;
+        let node = Node::new(running.instance(), identity, JOINING);
+        let mut arm = node.latest(service::ARM_STATE)?;
+        let mut status = node.latest(service::STATUS)?;
+        // So that the first look sees something. A role that is just starting is seen later.
+        arm.wait(FIRST_WORD);
+        status.wait(FIRST_WORD);
         Ok(Self {
-            arm: node.latest(service::ARM_STATE)?,
-            status: node.latest(service::STATUS)?,
+            arm,
+            status,
             task: node.latest(service::TASK)?,
             request: node.latest(service::REQUEST)?,
             feature: node.latest(service::FEATURE)?,

@@ -313,7 +313,7 @@ impl PerCycle {
             cycles: guarded.cycles,
             allocations: each(guarded.allocations),
             page_faults: each(guarded.minor_faults + guarded.major_faults),
-            system_calls: guarded.system_calls.and_then(each),
+            system_calls: each(guarded.system_calls),
             preemptions: each(guarded.preemptions),
         }
     }
@@ -369,7 +369,7 @@ mod tests {
         snapshot.guarded.cycles = 200;
         snapshot.guarded.minor_faults = 100;
         let shown = PerCycle::of(&snapshot);
-        assert_eq!((shown.allocations, shown.page_faults, shown.system_calls), (Some(0.0), Some(0.5), None));
+        assert_eq!((shown.allocations, shown.page_faults, shown.system_calls), (Some(0.0), Some(0.5), Some(0.0)));
     }
 
     #[test]

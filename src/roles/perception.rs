@@ -10,7 +10,7 @@ use crate::perception::Perception;
 pub struct PerceptionRole<P: Ports> {
     perception: Perception,
     seen: Feature,
-    cloud: P::Reader<PointCloud>,
+    cloud: P::Borrower<PointCloud>,
     feature: P::Writer<Feature>,
     unsent: u64,
 }
@@ -24,7 +24,7 @@ impl<P: Ports> PerceptionRole<P> {
         Ok(Self {
             perception,
             seen: Feature::default(),
-            cloud: ports.reader(service::CLOUD)?,
+            cloud: ports.borrower(service::CLOUD)?,
             feature: ports.writer(service::FEATURE)?,
             unsent: 0,
         })

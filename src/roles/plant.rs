@@ -28,7 +28,7 @@ pub struct PlantRole<P: Ports> {
 /// Where pictures are taken.
 enum Camera<P: Ports> {
     /// In the plant's cycle.
-    Within(P::Writer<PointCloud>),
+    Within(P::Lender<PointCloud>),
     /// By a [`CameraRole`] on another thread.
     Apart(SyncSender<(Stamp, Shot)>),
 }
@@ -44,8 +44,8 @@ impl CameraRole {
     ///
     /// # Errors
     /// What the bus says.
-    pub fn open<P: Ports>(&self, ports: &P) -> Result<P::Writer<PointCloud>, P::Error> {
-        ports.writer(service::CLOUD)
+    pub fn open<P: Ports>(&self, ports: &P) -> Result<P::Lender<PointCloud>, P::Error> {
+        ports.lender(service::CLOUD)
     }
 
     /// Takes the pictures the plant asks for, until the plant is dropped.
@@ -64,7 +64,7 @@ impl<P: Ports> PlantRole<P> {
     /// # Errors
     /// What the bus says.
     pub fn open(ports: &P, plant: Plant) -> Result<Self, P::Error> {
-        let camera = Camera::Within(ports.writer(service::CLOUD)?);
+        let camera = Camera::Within(ports.lender(service::CLOUD)?);
         Self::with_camera(ports, plant, camera)
     }
 

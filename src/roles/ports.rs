@@ -6,7 +6,9 @@ use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::rc::Rc;
 
-use tandem_bus::{BusError, Identity, Latest, Node, Publisher, Read, Slot, SlotReader, SlotWriter, Write};
+use tandem_bus::{
+    Borrower, BusError, Identity, Latest, Lender, Node, Publisher, Read, Slot, SlotReader, SlotWriter, Write,
+};
 use tandem_msg::Message;
 
 /// Opens the ports of one role.
@@ -15,6 +17,10 @@ pub trait Ports {
     type Writer<M: Message>: Write<M>;
     /// The reading end of a service.
     type Reader<M: Message>: Read<M>;
+    /// The writing end of a service whose messages are written in place.
+    type Lender<M: Message>: Write<M>;
+    /// The reading end of such a service.
+    type Borrower<M: Message>: Read<M>;
     /// Why a port could not be opened.
     type Error;
 
@@ -29,11 +35,25 @@ pub trait Ports {
     /// # Errors
     /// What the bus says.
     fn reader<M: Message>(&self, service: &str) -> Result<Self::Reader<M>, Self::Error>;
+
+    /// Opens a service to write in place: for large messages, outside a realtime loop.
+    ///
+    /// # Errors
+    /// What the bus says.
+    fn lender<M: Message>(&self, service: &str) -> Result<Self::Lender<M>, Self::Error>;
+
+    /// Opens a service to read in place: for large messages, outside a realtime loop.
+    ///
+    /// # Errors
+    /// What the bus says.
+    fn borrower<M: Message>(&self, service: &str) -> Result<Self::Borrower<M>, Self::Error>;
 }
 
 impl Ports for Node {
     type Writer<M: Message> = Publisher<M>;
     type Reader<M: Message> = Latest<M>;
+    type Lender<M: Message> = Lender<M>;
+    type Borrower<M: Message> = Borrower<M>;
     type Error = BusError;
 
     fn writer<M: Message>(&self, service: &str) -> Result<Publisher<M>, BusError> {
@@ -42,6 +62,14 @@ impl Ports for Node {
 
     fn reader<M: Message>(&self, service: &str) -> Result<Latest<M>, BusError> {
         self.latest(service)
+    }
+
+    fn lender<M: Message>(&self, service: &str) -> Result<Lender<M>, BusError> {
+        self.lender(service)
+    }
+
+    fn borrower<M: Message>(&self, service: &str) -> Result<Borrower<M>, BusError> {
+        self.borrower(service)
     }
 }
 
@@ -74,6 +102,8 @@ impl MemoryPorts {
 impl Ports for MemoryPorts {
     type Writer<M: Message> = SlotWriter<M>;
     type Reader<M: Message> = SlotReader<M>;
+    type Lender<M: Message> = SlotWriter<M>;
+    type Borrower<M: Message> = SlotReader<M>;
     type Error = Infallible;
 
     fn writer<M: Message>(&self, service: &str) -> Result<SlotWriter<M>, Infallible> {
@@ -82,5 +112,13 @@ impl Ports for MemoryPorts {
 
     fn reader<M: Message>(&self, service: &str) -> Result<SlotReader<M>, Infallible> {
         Ok(self.slot(service, |slot: &Slot<M>| slot.reader()))
+    }
+
+    fn lender<M: Message>(&self, service: &str) -> Result<SlotWriter<M>, Infallible> {
+        self.writer(service)
+    }
+
+    fn borrower<M: Message>(&self, service: &str) -> Result<SlotReader<M>, Infallible> {
+        self.reader(service)
     }
 }

@@ -10,6 +10,16 @@ pub trait Clock {
     fn now(&mut self) -> Stamp;
     /// Returns at `deadline` or later; at once when it has passed.
     fn wait_until(&mut self, deadline: Stamp);
+    /// Returns at `deadline` or later, without giving up the processor; answers when it is.
+    fn spin_until(&mut self, deadline: Stamp) -> Stamp {
+        loop {
+            let now = self.now();
+            if now >= deadline {
+                return now;
+            }
+            core::hint::spin_loop();
+        }
+    }
 }
 
 /// CLOCK_MONOTONIC.

@@ -54,6 +54,11 @@ impl Grid {
         Duration::from_nanos(self.phase_ns)
     }
 
+    /// Each `divisor`-th point of the clock's own grid of that period: some of these points, with the same phase.
+    pub(crate) fn every(&self, divisor: u32) -> Self {
+        Self { period_ns: self.period_ns * u64::from(divisor), phase_ns: self.phase_ns }
+    }
+
     /// The last point at or before `t`; the very first one if there is none.
     pub fn at_or_before(&self, t: Stamp) -> Stamp {
         let into = t.0.saturating_sub(self.phase_ns);

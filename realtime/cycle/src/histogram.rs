@@ -81,16 +81,20 @@ impl Histogram {
 
     /// The duration that the share `quantile` (0 to 1) of all does not exceed, nanoseconds.
     pub fn quantile_ns(&self, quantile: f64) -> u64 {
-        let rank = (quantile.clamp(0.0, 1.0) * self.total as f64).ceil().max(1.0) as u64;
-        let mut seen = 0;
-        for (index, count) in self.counts.iter().enumerate() {
-            seen += count;
-            if seen >= rank && index < BUCKETS - 1 {
-                return upper(index).min(self.max_ns);
-            }
-        }
-        self.max_ns
+        find(self.counts.iter().copied(), self.total, self.max_ns, quantile)
     }
+}
+
+fn find(counts: impl Iterator<Item = u64>, total: u64, max_ns: u64, quantile: f64) -> u64 {
+    let rank = (quantile.clamp(0.0, 1.0) * total as f64).ceil().max(1.0) as u64;
+    let mut seen = 0;
+    for (index, count) in counts.enumerate() {
+        seen += count;
+        if seen >= rank && index < BUCKETS - 1 {
+            return upper(index).min(max_ns);
+        }
+    }
+    max_ns
 }
 
 /// A [`Histogram`] that one loop writes while others read it.
@@ -121,6 +125,16 @@ impl SharedHistogram {
     /// The largest, nanoseconds; 0 when nothing was counted.
     pub fn max_ns(&self) -> u64 {
         self.max_ns.load(Ordering::Relaxed)
+    }
+
+    /// As [`Histogram::quantile_ns`], without a copy. By the one writer only.
+    ///
+    /// # Realtime
+    /// Bounded by the number of buckets.
+    pub(crate) fn quantile_ns(&self, quantile: f64) -> u64 {
+        let count = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        let total = self.counts.iter().map(count).sum();
+        find(self.counts.iter().map(count), total, self.max_ns(), quantile)
     }
 
     /// What has been counted so far; a duration that is just being counted may be missing.

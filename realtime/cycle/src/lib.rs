@@ -17,12 +17,14 @@ mod fixed_rate;
 mod grid;
 pub mod guard;
 mod histogram;
+mod overrun;
 mod record;
 pub mod setup;
 pub mod stats;
 
 pub use clock::{Clock, Monotonic};
-pub use fixed_rate::{FixedRate, Tick};
+pub use fixed_rate::{FixedRate, Pace, Tick};
 pub use grid::{Grid, GridError};
 pub use histogram::{Histogram, SharedHistogram};
+pub use overrun::Overrun;
 pub use record::{Record, SharedRecord};

@@ -131,6 +131,18 @@ pub enum BusError {
         /// What iceoryx2 says.
         cause: SubscriberCreateError,
     },
+    /// A writer's memory could not be had.
+    #[error("service {service}: no memory for a writer; is /dev/shm full? `tandem doctor` says more")]
+    NoMemory {
+        /// The service.
+        service: String,
+    },
+    /// The thread that keeps a process connected cannot be started.
+    #[error("the bus's thread cannot be started: {0}; are there too many threads?")]
+    Thread(std::io::Error),
+    /// The thread that keeps a process connected ended; this is a defect of Tandem.
+    #[error("the bus's thread ended unexpectedly; this is a defect, its message stands above")]
+    Ended,
     /// A leftover could not be removed.
     #[error("cannot remove {path}: {cause}; remove it by hand when the cell is not running")]
     Remove {

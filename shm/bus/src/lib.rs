@@ -2,12 +2,20 @@
 //! cleanup after a crash.
 //!
 //! A cell is an [`Instance`]: a name and a directory of its own. Every process
-//! of the cell opens one [`Node`] in it and from that node its ports: a
-//! [`Publisher`] for each message it writes, a [`Latest`] for each it reads.
+//! of the cell has one [`Node`] in it and from that node its ports. Messages that
+//! a cycle reads or writes travel in channels, large ones are loaned:
 //!
 //! ```text
-//! Publisher --loan, fill, header, send--> one slot of history --> Latest (buffer 1, oldest dropped)
+//! Publisher ──copy──▶ channel ──copy──▶ Latest       state, commands, tasks
+//! Lender ──loan, fill, send──▶ sample ──▶ Borrower   point clouds, in place
 //! ```
+//! Both are services of iceoryx2, which finds the peers, checks that they are of
+//! one build and configuration, gives the memory and takes it back after a crash.
+//! A channel is one sample that is sent once and then written again and again: a
+//! ring of slots, of which a reader copies the latest (`channel`). A publication
+//! through iceoryx2 itself allocates (one loan, since 0.10) and connects to peers
+//! where it is called; its blackboard does neither, but an entry whose writer was
+//! killed stays locked for ever. A channel does neither and comes back.
 //!
 //! **Invariant:** a reader never waits for a writer nor a writer for a reader;
 //! what a reader misses is overwritten.
@@ -18,20 +26,25 @@
 //! removed when [`Instance::clean_dead`] is called, and everything when
 //! [`Instance::remove`] is.
 //!
-//! Since iceoryx2 0.10 every loan makes one small heap allocation, so a publish
-//! costs one; reading costs none.
+//! **Invariant:** reading and writing a channel allocates nothing and makes no
+//! system call, whoever comes, goes or dies: a thread beside it (`link`) connects.
 
+mod channel;
 pub mod direct;
 mod error;
 mod instance;
+mod link;
+mod loan;
 mod memory;
 mod node;
 mod publisher;
 mod reader;
+mod service;
 mod wire;
 
 pub use error::{BusError, Intent};
 pub use instance::{Cleaned, Instance, Leftover, leftovers};
+pub use loan::{Borrower, Lender};
 pub use memory::{Slot, SlotReader, SlotWriter};
 pub use node::{Identity, Node};
 pub use publisher::{Publisher, Unsent};
@@ -41,8 +54,8 @@ use tandem_msg::{Header, Message, Stamp};
 
 /// Writes one message type; the header is the bus's own work.
 ///
-/// Implemented over shared memory ([`Publisher`]) and inside one process
-/// ([`SlotWriter`]); one set of tests holds for both.
+/// Implemented over shared memory ([`Publisher`], [`Lender`]) and inside one process
+/// ([`SlotWriter`]); one set of tests holds for all.
 pub trait Write<M: Message> {
     /// Publishes what `fill` writes. The header is set afterwards, whatever
     /// `fill` does to it. What `fill` leaves alone keeps an unspecified value.

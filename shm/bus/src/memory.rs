@@ -55,7 +55,7 @@ impl<M: Message> Write<M> for SlotWriter<M> {
 impl<M: Message> Read<M> for SlotReader<M> {
     fn read(&mut self) -> &M {
         let slot = self.slot.borrow();
-        if slot.header().heard() && newer(slot.header(), self.held.header()) {
+        if newer(slot.header(), self.held.header()) {
             *self.held = *slot;
         }
         drop(slot);

@@ -1,35 +1,24 @@
-//! One process's place on the bus, and the bounded opening of services.
+//! One process's place on the bus.
 
-use std::time::{Duration, Instant};
+use std::cell::OnceCell;
+use std::fmt::Debug;
+use std::sync::Arc;
+use std::time::Duration;
 
 use iceoryx2::node::NodeBuilder;
-use iceoryx2::port::publisher::PublisherCreateError;
-use iceoryx2::prelude::{
-    AttributeVerifier, BackpressureStrategy, MessagingPattern, NodeName, Service, ServiceName, SignalHandlingMode, ipc,
-};
-use iceoryx2::service::builder::publish_subscribe::{
-    PublishSubscribeCreateError as Create, PublishSubscribeOpenError as Open,
-    PublishSubscribeOpenOrCreateError as OpenOrCreate,
-};
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use iceoryx2::port::publisher::{Publisher as Port, PublisherCreateError};
+use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::prelude::{BackpressureStrategy, NodeName, SignalHandlingMode, ZeroCopySend, ipc};
 use tandem_msg::{Header, Message};
 
-use crate::wire::{Wire, schema_hash};
+use crate::channel::Channel;
+use crate::link::{Claim, Link};
+use crate::loan::{Borrower, Lender};
+use crate::service::{BUFFER, HISTORY, Kind, Opening, until};
+use crate::wire::{Wire, channel, loan};
 use crate::{BusError, Instance, Intent, Latest, Publisher};
 
-/// One writer, and its successor for as long as a predecessor is not cleaned up.
-const PUBLISHERS_MAX: usize = 2;
-const SUBSCRIBERS_MAX: usize = 4;
-const NODES_MAX: usize = 16;
-/// The latest value is all there is.
-const HISTORY: usize = 1;
-const BUFFER: usize = 1;
-/// The value held and the one that replaces it.
-const BORROWED: usize = 2;
-/// Between two attempts.
-const PAUSE: Duration = Duration::from_millis(5);
-const SCHEMA: &str = "schema";
-const CONFIG: &str = "config";
+type InnerNode = iceoryx2::node::Node<ipc::Service>;
 
 /// Who writes: goes into every header.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -42,22 +31,105 @@ pub struct Identity {
     pub config_hash: u64,
 }
 
-/// One process's place on the bus. Ports are bound to the thread that opened the node.
+/// One process's place on the bus.
+///
+/// Channels ([`Node::publisher`], [`Node::latest`]) are kept connected by a thread
+/// of their own. What is read and written in place ([`Node::lender`],
+/// [`Node::borrower`]) belongs to the thread that opened it.
 pub struct Node {
-    inner: iceoryx2::node::Node<ipc::Service>,
-    identity: Identity,
-    deadline: Duration,
+    joining: Joining,
+    /// Started with the first channel.
+    link: OnceCell<Arc<Link>>,
+    /// Joins with the first loan.
+    local: OnceCell<InnerNode>,
+}
+
+/// What joining the bus takes.
+#[derive(Clone, Debug)]
+pub(crate) struct Joining {
+    pub(crate) instance: Instance,
+    pub(crate) identity: Identity,
+    pub(crate) deadline: Duration,
 }
 
 impl Node {
-    /// Joins the bus of a cell. No signal handler is installed. Whatever is opened
-    /// from this node is tried again until `deadline` has passed, when the trouble may be passing.
+    /// A place on the bus of a cell; it joins when the first port is opened. No
+    /// signal handler is installed. Whatever is opened from this node is tried again
+    /// until `deadline` has passed, when the trouble may be passing.
+    pub fn new(instance: &Instance, identity: Identity, deadline: Duration) -> Self {
+        let joining = Joining { instance: instance.clone(), identity, deadline };
+        Self { joining, link: OnceCell::new(), local: OnceCell::new() }
+    }
+
+    /// The writing end of a service's latest value.
     ///
     /// # Errors
-    /// [`BusError::Node`].
-    pub fn open(instance: &Instance, identity: Identity, deadline: Duration) -> Result<Self, BusError> {
-        let config = instance.config();
-        let name: NodeName = identity.role.as_str().try_into().unwrap_or_default();
+    /// `Node`, `InvalidService`, `Service`, `Mismatch`, `WriterPort`.
+    pub fn publisher<M: Message>(&self, service: &str) -> Result<Publisher<M>, BusError> {
+        let (link, joining, service) = (self.link()?, self.joining.clone(), service.to_owned());
+        let (port, place) = link.ask(move |desk| {
+            let port = joining.writer::<Channel<M>>(&desk.node, &service, channel::<M>())?;
+            desk.keep_writer(port, joining.identity.epoch).ok_or(BusError::NoMemory { service })
+        })??;
+        Ok(Publisher::new(place, self.joining.header(), Claim { link, port }))
+    }
+
+    /// The reading end of a service's latest value.
+    ///
+    /// # Errors
+    /// `Node`, `InvalidService`, `Service`, `Mismatch`, `ReaderPort`.
+    pub fn latest<M: Message>(&self, service: &str) -> Result<Latest<M>, BusError> {
+        let (link, joining, service) = (self.link()?, self.joining.clone(), service.to_owned());
+        let (port, door) = link.ask(move |desk| {
+            let port = joining.reader::<Channel<M>>(&desk.node, &service, channel::<M>())?;
+            Ok::<_, BusError>(desk.keep_reader(port))
+        })??;
+        Ok(Latest::new(door, Claim { link, port }))
+    }
+
+    /// The writing end of a service whose messages are written in place.
+    ///
+    /// # Errors
+    /// As [`Node::publisher`].
+    pub fn lender<M: Message>(&self, service: &str) -> Result<Lender<M>, BusError> {
+        let port = self.joining.writer::<Wire<M>>(self.local()?, service, loan::<M>())?;
+        Ok(Lender::new(port, self.joining.header()))
+    }
+
+    /// The reading end of a service whose messages are read in place.
+    ///
+    /// # Errors
+    /// As [`Node::latest`].
+    pub fn borrower<M: Message>(&self, service: &str) -> Result<Borrower<M>, BusError> {
+        Ok(Borrower::new(self.joining.reader::<Wire<M>>(self.local()?, service, loan::<M>())?))
+    }
+
+    fn link(&self) -> Result<Arc<Link>, BusError> {
+        match self.link.get() {
+            Some(link) => Ok(Arc::clone(link)),
+            None => {
+                let joining = self.joining.clone();
+                let link = Link::start(move || joining.node())?;
+                Ok(Arc::clone(self.link.get_or_init(|| link)))
+            }
+        }
+    }
+
+    fn local(&self) -> Result<&InnerNode, BusError> {
+        match self.local.get() {
+            Some(node) => Ok(node),
+            None => {
+                let node = self.joining.node()?;
+                Ok(self.local.get_or_init(|| node))
+            }
+        }
+    }
+}
+
+impl Joining {
+    fn node(&self) -> Result<InnerNode, BusError> {
+        let config = self.instance.config();
+        let name: NodeName = self.identity.role.as_str().try_into().unwrap_or_default();
         let create = || {
             NodeBuilder::new()
                 .config(&config)
@@ -65,24 +137,22 @@ impl Node {
                 .signal_handling_mode(SignalHandlingMode::Disabled)
                 .create::<ipc::Service>()
         };
-        match until(deadline, create, |_| true) {
-            Ok(inner) => Ok(Self { inner, identity, deadline }),
-            Err((cause, waited)) => Err(BusError::Node {
-                instance: instance.id().to_owned(),
-                root: instance.root().to_owned(),
-                role: identity.role,
-                waited,
-                cause,
-            }),
-        }
+        until(self.deadline, create, |_| true).map_err(|(cause, waited)| BusError::Node {
+            instance: self.instance.id().to_owned(),
+            root: self.instance.root().to_owned(),
+            role: self.identity.role.clone(),
+            waited,
+            cause,
+        })
     }
 
-    /// The writing end of a service.
-    ///
-    /// # Errors
-    /// `InvalidService`, `Service`, `Mismatch`, `WriterPort`.
-    pub fn publisher<M: Message>(&self, service: &str) -> Result<Publisher<M>, BusError> {
-        let factory = self.service::<M>(service, Intent::Write)?;
+    fn writer<T: ZeroCopySend + Debug>(
+        &self,
+        node: &InnerNode,
+        service: &str,
+        kind: Kind,
+    ) -> Result<Port<ipc::Service, T, ()>, BusError> {
+        let factory = Opening { node, joining: self, service, kind }.open::<T>(Intent::Write)?;
         let create = || {
             factory
                 .publisher_builder()
@@ -92,129 +162,31 @@ impl Node {
                 .create()
         };
         let passing = |cause: &PublisherCreateError| *cause == PublisherCreateError::ExceedsMaxSupportedPublishers;
-        match until(self.deadline, create, passing) {
-            Ok(port) => Ok(Publisher::new(port, self.header())),
-            Err((cause, waited)) => Err(BusError::WriterPort {
-                service: service.to_owned(),
-                role: self.identity.role.clone(),
-                waited,
-                cause,
-            }),
-        }
+        until(self.deadline, create, passing).map_err(|(cause, waited)| BusError::WriterPort {
+            service: service.to_owned(),
+            role: self.identity.role.clone(),
+            waited,
+            cause,
+        })
     }
 
-    /// The reading end of a service.
-    ///
-    /// # Errors
-    /// `InvalidService`, `Service`, `Mismatch`, `ReaderPort`.
-    pub fn latest<M: Message>(&self, service: &str) -> Result<Latest<M>, BusError> {
-        let factory = self.service::<M>(service, Intent::Read)?;
+    fn reader<T: ZeroCopySend + Debug>(
+        &self,
+        node: &InnerNode,
+        service: &str,
+        kind: Kind,
+    ) -> Result<Subscriber<ipc::Service, T, ()>, BusError> {
+        let factory = Opening { node, joining: self, service, kind }.open::<T>(Intent::Read)?;
         let create = || factory.subscriber_builder().buffer_size(BUFFER).history_request(HISTORY).create();
-        match until(self.deadline, create, |_| true) {
-            Ok(port) => Ok(Latest::new(port)),
-            Err((cause, waited)) => Err(BusError::ReaderPort {
-                service: service.to_owned(),
-                role: self.identity.role.clone(),
-                waited,
-                cause,
-            }),
-        }
+        until(self.deadline, create, |_| true).map_err(|(cause, waited)| BusError::ReaderPort {
+            service: service.to_owned(),
+            role: self.identity.role.clone(),
+            waited,
+            cause,
+        })
     }
 
     fn header(&self) -> Header {
         Header { epoch: self.identity.epoch, config_hash: self.identity.config_hash, ..Header::default() }
-    }
-
-    fn service<M: Message>(
-        &self,
-        service: &str,
-        intent: Intent,
-    ) -> Result<PortFactory<ipc::Service, Wire<M>, ()>, BusError> {
-        let invalid = || BusError::InvalidService { service: service.to_owned() };
-        let name: ServiceName = service.try_into().map_err(|_| invalid())?;
-        let ours = [(SCHEMA, schema_hash::<M>()), (CONFIG, self.identity.config_hash)];
-        let mut verifier = AttributeVerifier::new();
-        for (key, value) in ours {
-            let key = key.try_into().expect("a short word");
-            verifier =
-                verifier.require(&key, &hex(value).as_str().try_into().expect("16 digits")).expect("two of many");
-        }
-        let open = || {
-            self.inner
-                .service_builder(&name)
-                .publish_subscribe::<Wire<M>>()
-                .max_publishers(PUBLISHERS_MAX)
-                .max_subscribers(SUBSCRIBERS_MAX)
-                .max_nodes(NODES_MAX)
-                .history_size(HISTORY)
-                .subscriber_max_buffer_size(BUFFER)
-                .subscriber_max_borrowed_samples(BORROWED)
-                .enable_safe_overflow(true)
-                .open_or_create_with_attributes(&verifier)
-        };
-        until(self.deadline, open, passing).map_err(|(cause, waited)| {
-            let (service, role) = (service.to_owned(), self.identity.role.clone());
-            match self.difference(&name, &ours).filter(|_| incompatible(&cause)) {
-                Some((field, found, ours)) => BusError::Mismatch { service, role, intent, field, found, ours },
-                None => BusError::Service { service, role, intent, waited, cause },
-            }
-        })
-    }
-
-    /// The first attribute the existing service has otherwise: key, value there, value here.
-    fn difference(&self, name: &ServiceName, ours: &[(&'static str, u64)]) -> Option<(&'static str, String, String)> {
-        let details =
-            ipc::Service::details(name, self.inner.config(), MessagingPattern::PublishSubscribe).ok().flatten()?;
-        ours.iter().find_map(|&(key, value)| {
-            let found = details.static_details.attributes().key_value(&key.try_into().ok()?, 0)?.to_string();
-            (found != hex(value)).then(|| (key, found, hex(value)))
-        })
-    }
-}
-
-fn hex(value: u64) -> String {
-    format!("{value:016x}")
-}
-
-fn incompatible(cause: &OpenOrCreate) -> bool {
-    use OpenOrCreate::PublishSubscribeOpenError as Opening;
-    matches!(cause, Opening(Open::IncompatibleAttributes | Open::IncompatibleTypes))
-}
-
-/// Whether waiting may help: a peer is creating, leaving or being cleaned up.
-fn passing(cause: &OpenOrCreate) -> bool {
-    use OpenOrCreate::{PublishSubscribeCreateError as Creating, PublishSubscribeOpenError as Opening};
-    match cause {
-        Opening(open) => matches!(
-            open,
-            Open::DoesNotExist
-                | Open::InternalFailure
-                | Open::ServiceInCorruptedState
-                | Open::HangsInCreation
-                | Open::IsMarkedForDestruction
-                | Open::ExceedsMaxNumberOfNodes
-                | Open::UnableToCreateServiceTag
-                | Open::Interrupt
-        ),
-        Creating(create) => {
-            !matches!(create, Create::InsufficientPermissions | Create::SubscriberBufferMustBeLargerThanHistorySize)
-        }
-        _ => true,
-    }
-}
-
-/// Tries until it succeeds, the trouble is not `passing`, or `deadline` has passed.
-fn until<T, E>(
-    deadline: Duration,
-    mut attempt: impl FnMut() -> Result<T, E>,
-    passing: impl Fn(&E) -> bool,
-) -> Result<T, (E, Duration)> {
-    let start = Instant::now();
-    loop {
-        match attempt() {
-            Ok(done) => return Ok(done),
-            Err(cause) if !passing(&cause) || start.elapsed() >= deadline => return Err((cause, start.elapsed())),
-            Err(_) => std::thread::sleep(PAUSE),
-        }
     }
 }

@@ -1,14 +1,11 @@
-//! The writing end of a service.
+//! The writing end of a channel.
 
 #![allow(unsafe_code)]
 
-use iceoryx2::port::publisher::Publisher as Port;
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::ipc;
 use tandem_msg::{Header, Message, Stamp};
 
 use crate::Write;
-use crate::wire::Wire;
+use crate::link::{Claim, Place};
 
 /// Why a message was not published. The next cycle publishes anew; count it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,19 +18,16 @@ pub enum Unsent {
 
 /// Writes one message type of one service.
 pub struct Publisher<M: Message> {
-    port: Port<ipc::Service, Wire<M>, ()>,
+    place: Place<M>,
+    /// What is published next is put together here.
+    staged: Box<M>,
     last: Header,
+    _claim: Claim,
 }
 
 impl<M: Message> Publisher<M> {
-    pub(crate) fn new(port: Port<ipc::Service, Wire<M>, ()>, first: Header) -> Self {
-        Self { port, last: first }
-    }
-
-    /// Connects to readers that came since the last call, so that the next publish
-    /// need not: mapping their memory costs system calls. False when one failed.
-    pub fn connect(&self) -> bool {
-        self.port.update_connections().is_ok()
+    pub(crate) fn new(place: Place<M>, first: Header, claim: Claim) -> Self {
+        Self { place, staged: Box::default(), last: first, _claim: claim }
     }
 
     /// Header of the last publication.
@@ -43,22 +37,16 @@ impl<M: Message> Publisher<M> {
 }
 
 impl<M: Message> Write<M> for Publisher<M> {
+    /// Never fails.
+    ///
     /// # Realtime
-    /// One small heap allocation by iceoryx2 0.10 for the loan; no system call unless a reader has come or gone.
-    /// `fill` writes straight into shared memory: nothing is copied afterwards.
+    /// Copies the message once, into shared memory. Allocates nothing, makes no system call, whoever comes or goes.
     fn publish_with(&mut self, stamp: Stamp, fill: impl FnOnce(&mut M)) -> Result<Header, Unsent> {
-        let mut loan = self.port.loan_uninit().map_err(|_| Unsent::NoSlot)?;
-        let header = self.last.next(stamp);
-        // SAFETY: the slot is mapped shared memory that this loan alone may write; it
-        // holds zeros from the kernel or an earlier message, and the implementor of
-        // `Message` vouches that every bit pattern is a valid value.
-        let slot: &mut M = unsafe { &mut *loan.payload_mut().as_mut_ptr().cast::<M>() };
-        fill(slot);
-        *slot.header_mut() = header;
-        // SAFETY: initialised above, by the argument above.
-        let sample = unsafe { loan.assume_init() };
-        // A publication that reached only some readers has used its number.
-        self.last = header;
-        sample.send().map(|_| header).map_err(|_| Unsent::Connection)
+        fill(&mut self.staged);
+        self.last = self.last.next(stamp);
+        *self.staged.header_mut() = self.last;
+        // SAFETY: valid while its port is looked after, which is until our claim is dropped.
+        unsafe { self.place.0.as_ref() }.publish(&self.staged);
+        Ok(self.last)
     }
 }

@@ -1,71 +1,79 @@
-//! The reading end of a service.
+//! The reading end of a channel.
 
-use iceoryx2::port::subscriber::Subscriber;
-use iceoryx2::port::update_connections::UpdateConnections;
-use iceoryx2::prelude::ipc;
-use iceoryx2::sample::Sample;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
 use tandem_msg::{Header, Message};
 
 use crate::Read;
-use crate::wire::Wire;
+use crate::channel::Look;
+use crate::link::{Claim, Door};
 
-/// Writers of a service times its buffer, and one: no read takes in more than this.
-const TAKEN_MAX: usize = 3;
+/// Between two looks for a first value.
+const PAUSE: Duration = Duration::from_millis(1);
 
-/// The latest value of one service. Holds its slot of shared memory until a newer one comes,
-/// also when the writer is dead.
+/// The latest value of one service; keeps the last one also when its writer is dead.
 pub struct Latest<M: Message> {
-    port: Subscriber<ipc::Service, Wire<M>, ()>,
-    held: Option<Sample<ipc::Service, Wire<M>, ()>>,
-    /// What is read before anything was heard.
-    never: Box<M>,
-    failures: u64,
+    door: Arc<Door<M>>,
+    held: Box<M>,
+    /// The next value is copied here first.
+    incoming: Box<M>,
+    /// Number of the publication seen last, of the present channel.
+    seen: u64,
+    torn: u64,
+    _claim: Claim,
 }
 
 impl<M: Message> Latest<M> {
-    pub(crate) fn new(port: Subscriber<ipc::Service, Wire<M>, ()>) -> Self {
-        Self { port, held: None, never: Box::default(), failures: 0 }
+    pub(crate) fn new(door: Arc<Door<M>>, claim: Claim) -> Self {
+        Self { door, held: Box::default(), incoming: Box::default(), seen: 0, torn: 0, _claim: claim }
     }
 
-    /// Connects to writers that came since the last call, so that the next read need not.
-    /// False when one failed.
-    pub fn connect(&self) -> bool {
-        self.port.update_connections().is_ok()
+    /// Waits for the first value, at most so long; answers whether there is one. For whoever joins to look, never in a cycle.
+    pub fn wait(&mut self, patience: Duration) -> bool {
+        let start = Instant::now();
+        while !self.read().header().heard() && start.elapsed() < patience {
+            std::thread::sleep(PAUSE);
+        }
+        self.held.header().heard()
     }
 
-    /// Reads that found a connection broken.
+    /// Reads that kept the value they had: the writer was too fast, or a connection broken.
     pub fn failures(&self) -> u64 {
-        self.failures
+        self.torn + self.door.failures()
     }
 }
 
 impl<M: Message> Read<M> for Latest<M> {
     /// # Realtime
-    /// Never blocks and allocates nothing; no system call unless a writer has come or gone.
+    /// Copies a new value once; a few loads when there is none. Allocates nothing, makes no system call, whoever
+    /// comes or goes. Bounded: a copy the writer disturbs is tried a few times.
     fn read(&mut self) -> &M {
-        for _ in 0..TAKEN_MAX {
-            match self.port.receive() {
-                Ok(Some(sample)) => {
-                    if newer(sample.payload().0.header(), self.held().header()) {
-                        self.held = Some(sample);
+        if let Some((channel, changed)) = self.door.enter() {
+            let seen = if changed { 0 } else { self.seen };
+            match channel.look(seen, &mut self.incoming) {
+                Look::Copied(number) => {
+                    self.seen = number;
+                    if newer(self.incoming.header(), self.held.header()) {
+                        std::mem::swap(&mut self.held, &mut self.incoming);
                     }
                 }
-                Ok(None) => break,
-                Err(_) => {
-                    self.failures += 1;
-                    break;
+                Look::Torn => {
+                    self.seen = seen;
+                    self.torn += 1;
                 }
+                Look::Same => self.seen = seen,
             }
         }
-        self.held()
+        &self.held
     }
 
     fn held(&self) -> &M {
-        self.held.as_ref().map_or(&*self.never, |sample| &sample.payload().0)
+        &self.held
     }
 }
 
 /// Whether a value that has just come in replaces the one that is held.
 pub(crate) fn newer(incoming: &Header, held: &Header) -> bool {
-    (incoming.epoch, incoming.seq) > (held.epoch, held.seq) || !held.heard()
+    incoming.heard() && (!held.heard() || (incoming.epoch, incoming.seq) > (held.epoch, held.seq))
 }

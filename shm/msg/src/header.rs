@@ -107,7 +107,7 @@ pub enum Suspect {
 ///
 /// # Safety
 /// The implementor is `repr(C)` or `repr(transparent)`, holds no pointer or
-/// reference, and every bit pattern a peer may leave in it is a valid value.
+/// reference, has no padding between or after its fields, and every bit pattern a peer may leave in it is a valid value.
 #[allow(unsafe_code)]
 pub unsafe trait Message: Copy + Default + Send + Sync + 'static {
     /// Name of the type on the wire.

@@ -5,6 +5,7 @@
 //! [`Notice`] with the way to mend it. With [`Policy::Enforce`] anything missing
 //! refuses the start.
 
+mod latency;
 mod memory;
 mod notice;
 mod scheduling;
@@ -31,6 +32,9 @@ pub struct Wish {
     pub cpu: Option<u32>,
     /// Whether memory shall be locked and touched beforehand.
     pub lock_memory: bool,
+    /// What `/dev/cpu_dma_latency` shall be held at, microseconds, so that idle processors wake up in time; none
+    /// leaves it to the kernel. Held for as long as the process lives.
+    pub dma_latency_us: Option<u32>,
 }
 
 /// What is in force for the calling thread, as read back from the kernel.
@@ -81,13 +85,19 @@ pub fn acquire(wish: &Wish) -> Result<Granted, Denied> {
     if let Some(priority) = wish.priority {
         notices.add(scheduling::fifo(priority));
     }
+    let mut dma_latency_us = None;
+    if let Some(wanted) = wish.dma_latency_us {
+        let held = latency::hold(wanted);
+        dma_latency_us = held.is_ok().then_some(wanted.into());
+        notices.add(held);
+    }
     let prefaulted = if wish.lock_memory { memory::touch_stack() } else { 0 };
     let granted = Granted {
         priority: scheduling::fifo_in_force(),
         cpu: scheduling::bound_to(),
         locked: wish.lock_memory && memory::locked_in_force(),
         prefaulted,
-        dma_latency_us: None,
+        dma_latency_us,
         timer_slack_ns: scheduling::timer_slack_ns(),
         notices,
     };
@@ -101,7 +111,8 @@ pub fn acquire(wish: &Wish) -> Result<Granted, Denied> {
 mod tests {
     use super::*;
 
-    const NOTHING: Wish = Wish { policy: Policy::BestEffort, priority: None, cpu: None, lock_memory: false };
+    const NOTHING: Wish =
+        Wish { policy: Policy::BestEffort, priority: None, cpu: None, lock_memory: false, dma_latency_us: None };
 
     fn on_own_thread(wish: Wish) -> Result<Granted, Denied> {
         std::thread::spawn(move || acquire(&wish)).join().expect("it ends")

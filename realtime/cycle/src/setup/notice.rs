@@ -31,6 +31,11 @@ pub enum Notice {
         /// RLIMIT_MEMLOCK, bytes.
         limit: u64,
     },
+    /// The kernel may let idle processors sleep deeper than was asked.
+    LatencyNotHeld {
+        /// What the kernel said.
+        cause: Errno,
+    },
 }
 
 impl fmt::Display for Notice {
@@ -55,12 +60,17 @@ impl fmt::Display for Notice {
                  fail; a page fault may delay a cycle; allow it with `ulimit -l unlimited` or a memlock line in \
                  /etc/security/limits.conf"
             ),
+            Self::LatencyNotHeld { cause } => write!(
+                f,
+                "/dev/cpu_dma_latency cannot be held ({cause}): an idle processor may wake up late; run as root or make \
+                 the file writable, or leave realtime.cpu_dma_latency_us away"
+            ),
         }
     }
 }
 
-/// One for each kind of [`Notice`] a loop can get: processor, scheduler, memory.
-pub const NOTICES_MAX: usize = 3;
+/// One for each kind of [`Notice`] a loop can get: processor, scheduler, memory, idle processors.
+pub const NOTICES_MAX: usize = 4;
 
 /// What was not granted, in fixed memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -7,8 +7,9 @@ use std::path::{Path, PathBuf};
 use tandem_msg::{Role, Stamp};
 
 use super::*;
+use crate::overrun::Beginning;
 use crate::setup::Granted;
-use crate::{FixedRate, Grid, Monotonic, SharedRecord};
+use crate::{FixedRate, Grid, Monotonic, Pace, SharedRecord};
 
 /// A file of its own for a test, removed at its end.
 struct Scratch(PathBuf);
@@ -34,6 +35,10 @@ fn writer(path: &Path, epoch: u64) -> Writer {
     Writer::create(path, Role::Controller, epoch, &grid(), &["arm/state"], &granted, Stamp(7)).expect("writable")
 }
 
+fn begun(missed: u64) -> Beginning {
+    Beginning { now: Stamp(0), missed, left_out: 0, caught_up: false, overloaded: false }
+}
+
 fn snapshot(reader: &Reader) -> Snapshot {
     let mut snapshot = Snapshot::default();
     reader.read(&mut snapshot).expect("an incarnation is at work");
@@ -44,7 +49,7 @@ fn snapshot(reader: &Reader) -> Snapshot {
 #[test]
 fn a_reader_sees_what_the_loop_records() {
     let file = Scratch::new("sees");
-    let mut rate = FixedRate::recording_in(writer(&file.0, 3), grid(), Monotonic);
+    let mut rate = FixedRate::recording_in(writer(&file.0, 3), grid(), Monotonic, Pace::default());
     let reader = Reader::open(&file.0).expect("it is there");
     for cycle in 1..=20_u64 {
         rate.wait();
@@ -72,19 +77,19 @@ fn a_successor_counts_on() {
     let file = Scratch::new("successor");
     let first = writer(&file.0, 1);
     let record: &SharedRecord = first.borrow();
-    (0..5).for_each(|_| record.cycle_began(10, 2));
-    first.guarded(&Guarded { cycles: 5, allocations: 1, system_calls: Some(5), ..Guarded::default() });
+    (0..5).for_each(|_| record.cycle_began(10, &begun(2)));
+    first.guarded(&Guarded { cycles: 5, allocations: 1, system_calls: 5, ..Guarded::default() });
     let reader = Reader::open(&file.0).expect("it is there");
-    assert_eq!(snapshot(&reader).guarded.system_calls, Some(5));
+    assert_eq!(snapshot(&reader).guarded.system_calls, 5);
     drop(first);
     assert_eq!(snapshot(&reader).record.cycles, 5, "the dead one's record stays readable");
 
     let second = writer(&file.0, 2);
     let record: &SharedRecord = second.borrow();
-    record.cycle_began(10, 0);
+    record.cycle_began(10, &begun(0));
     let seen = snapshot(&reader);
     assert_eq!((seen.epoch, seen.record.cycles, seen.record.missed), (2, 1, 0));
-    assert_eq!(seen.earlier, Earlier { incarnations: 1, cycles: 5, missed: 10, overruns: 0 });
+    assert_eq!(seen.earlier, Earlier { incarnations: 1, cycles: 5, missed: 10, ..Earlier::default() });
     assert_eq!((seen.guarded.cycles, seen.guarded.allocations), (0, 0));
 }
 

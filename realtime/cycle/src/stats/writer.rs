@@ -12,7 +12,7 @@ use tandem_msg::{Coded, Role, Stamp};
 use super::mapping::Mapping;
 use super::page::{Earlier, Guarded, LAYOUT, Page};
 use crate::setup::Granted;
-use crate::{Grid, SharedRecord};
+use crate::{Grid, Record, SharedRecord};
 
 /// Writes the statistics of one incarnation of a role.
 pub struct Writer {
@@ -41,11 +41,14 @@ impl Writer {
         fence(Ordering::Release);
         let mut earlier = page.earlier.get();
         if epoch_before != 0 && page.layout.get() == LAYOUT {
+            let mut last = Record::default();
+            page.record.copy_to(&mut last);
             earlier = Earlier {
                 incarnations: earlier.incarnations + 1,
-                cycles: earlier.cycles + page.record.cycles(),
-                missed: earlier.missed + page.record.missed(),
-                overruns: earlier.overruns + page.record.overruns(),
+                cycles: earlier.cycles + last.cycles,
+                missed: earlier.missed + last.missed,
+                overruns: earlier.overruns + last.overruns,
+                stops: earlier.stops + last.stops,
             };
         }
         page.earlier.set(&earlier);

@@ -1,9 +1,9 @@
 //! Two cells side by side, peers that do not belong, and what must not be found.
 
 use tandem_bus::{BusError, Identity, Node, Read, Write};
-use tandem_msg::{JointCommand, JointState, Stamp};
+use tandem_msg::{Header, JointCommand, JointState, Stamp};
 
-use crate::{PATIENCE, Scratch, identity};
+use crate::{PATIENCE, Scratch, hear, identity};
 
 /// Two instances speak the same service names and never hear each other; removing one leaves the other alone.
 #[test]
@@ -16,7 +16,7 @@ fn two_instances_side_by_side_do_not_meet() {
     let mut reader_two = node_two.latest::<JointState>("arm/state").expect("a free service");
 
     writer_one.publish(Stamp(1), &JointState::default()).expect("a free slot");
-    assert!(reader_one.read().header.heard());
+    hear(&mut reader_one, Header::heard);
     assert!(!reader_two.read().header.heard());
 
     drop((node_one, writer_one, reader_one));
@@ -24,7 +24,7 @@ fn two_instances_side_by_side_do_not_meet() {
     assert!(one.instance.shared_memory().is_empty());
     assert!(!two.instance.shared_memory().is_empty());
     writer_two.publish(Stamp(1), &JointState::default()).expect("a free slot");
-    assert!(reader_two.read().header.heard());
+    hear(&mut reader_two, Header::heard);
 }
 
 /// A process of another configuration is refused when it opens, with both values, not when it speaks.
@@ -34,7 +34,7 @@ fn another_configuration_is_refused() {
     let node = scratch.node("plant", 1);
     let _writer = node.publisher::<JointState>("arm/state").expect("a free service");
     let stranger = Identity { config_hash: 8, ..identity("controller", 1) };
-    let stranger = Node::open(&scratch.instance, stranger, PATIENCE).expect("a free bus");
+    let stranger = Node::new(&scratch.instance, stranger, PATIENCE);
     let refused = stranger.latest::<JointState>("arm/state").err().expect("another configuration");
     assert_eq!(
         refused.to_string(),
@@ -58,7 +58,7 @@ fn another_message_type_is_refused() {
 fn more_writers_than_one_and_its_successor_are_refused_in_time() {
     let scratch = Scratch::new();
     let patience = std::time::Duration::from_millis(50);
-    let node = Node::open(&scratch.instance, identity("plant", 1), patience).expect("a free bus");
+    let node = Node::new(&scratch.instance, identity("plant", 1), patience);
     let open = || node.publisher::<JointState>("arm/state");
     let (_first, _second) = (open().expect("a free service"), open().expect("room for a successor"));
     let start = std::time::Instant::now();

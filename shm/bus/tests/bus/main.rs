@@ -6,9 +6,10 @@ mod isolation;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use tandem_bus::{Identity, Instance, Node};
+use tandem_bus::{Identity, Instance, Node, Read};
+use tandem_msg::{Header, Message};
 use tempfile::TempDir;
 
 /// Longer than any healthy open on a busy machine.
@@ -32,7 +33,7 @@ impl Scratch {
     }
 
     fn node(&self, role: &str, epoch: u64) -> Node {
-        Node::open(&self.instance, identity(role, epoch), PATIENCE).expect("a free bus")
+        Node::new(&self.instance, identity(role, epoch), PATIENCE)
     }
 
     fn path(&self) -> &Path {
@@ -47,6 +48,21 @@ impl Drop for Scratch {
             removed.expect("everything of the instance can be removed");
             assert_eq!(self.instance.shared_memory(), Vec::<PathBuf>::new());
         }
+    }
+}
+
+/// Reads until what is `wanted` is heard: a peer is connected by a thread of its own, soon but not at once.
+fn hear<M: Message>(reader: &mut impl Read<M>, wanted: impl Fn(&Header) -> bool) -> M {
+    within_patience("a value is heard", || wanted(reader.read().header()));
+    *reader.held()
+}
+
+/// Waits until `reached`.
+fn within_patience(what: &str, mut reached: impl FnMut() -> bool) {
+    let start = Instant::now();
+    while !reached() {
+        assert!(start.elapsed() < PATIENCE, "{what}");
+        std::thread::yield_now();
     }
 }
 

@@ -1,4 +1,4 @@
-//! Counts what a cycle allocates.
+//! Counts what a cycle allocates, and what its thread asks of the kernel.
 //!
 //! A binary installs [`CountingAllocator`] and wraps each cycle in [`counted`]:
 //!
@@ -15,6 +15,10 @@
 //! ```
 
 #![allow(unsafe_code)]
+
+mod watch;
+
+pub use watch::{Usage, Watch};
 
 use core::cell::Cell;
 use std::alloc::{GlobalAlloc, Layout, System};
