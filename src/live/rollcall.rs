@@ -49,7 +49,12 @@ impl RollCall {
     /// have moved; has those killed that were found silent.
     pub(super) fn call(&mut self, now: Stamp, reports: &mpsc::Receiver<Report>, heard: &[Header; 3], orders: &Orders) {
         for report in reports.try_iter() {
+            let lost = matches!(report, Report::Lost { .. });
             self.note(now, report);
+            if lost {
+                // Its successor may have been started already: the loss is to be seen for a cycle first.
+                break;
+            }
         }
         for ((role, health), pulse) in CHILDREN.into_iter().zip(&mut self.health).zip(heard) {
             if health.observe(pulse).is_some() {
