@@ -26,6 +26,9 @@ use crate::roles::service;
 const JOINING: Duration = Duration::from_secs(2);
 /// How long the first word of a role is waited for.
 const FIRST_WORD: Duration = Duration::from_millis(100);
+/// Statistics are copied this often at most, however often is looked: a copy goes through the caches of a processor that
+/// a loop runs on.
+const COPYING: Duration = Duration::from_millis(100);
 /// What is called recent.
 const RECENT: Duration = Duration::from_secs(1);
 
@@ -52,6 +55,8 @@ struct Loop {
     /// An earlier look, to say what is recent.
     then: Box<Snapshot>,
     then_at: Stamp,
+    /// What the last copy showed, and when it was taken.
+    shown: Option<(Stamp, LoopView)>,
 }
 
 /// Why a cell cannot be looked at.
@@ -134,7 +139,8 @@ impl Observer {
 
 impl Loop {
     fn open(role: Role, running: &RunningCell) -> Self {
-        let mut one = Self { role, reader: None, now: Box::default(), then: Box::default(), then_at: Stamp(0) };
+        let mut one =
+            Self { role, reader: None, now: Box::default(), then: Box::default(), then_at: Stamp(0), shown: None };
         one.read(running);
         one
     }
@@ -148,6 +154,13 @@ impl Loop {
     }
 
     fn look(&mut self, now: Stamp, running: &RunningCell) -> Option<LoopView> {
+        if self.shown.as_ref().is_none_or(|(at, _)| at.age_at(now) >= COPYING) {
+            self.shown = self.copy(now, running).map(|view| (now, view));
+        }
+        self.shown.as_ref().map(|(_, view)| view.clone())
+    }
+
+    fn copy(&mut self, now: Stamp, running: &RunningCell) -> Option<LoopView> {
         if !self.read(running) {
             return None;
         }
