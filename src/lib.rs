@@ -12,6 +12,7 @@ pub mod lockstep;
 pub mod observe;
 pub mod perception;
 pub mod plant;
+pub mod recognise;
 pub mod roles;
 pub mod strategy;
 pub mod supervisor;
