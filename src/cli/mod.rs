@@ -7,9 +7,12 @@
 mod bench;
 mod check;
 mod doctor;
+mod eval;
 pub mod exit;
+mod features;
 mod journal;
 mod progress;
+mod recognise;
 mod role;
 mod run;
 mod status;
@@ -45,6 +48,10 @@ enum Command {
     Bench(bench::BenchArgs),
     /// What was done to each box, by whom, when
     Journal(journal::JournalArgs),
+    /// What perception makes of clouds and meshes in files
+    Recognise(recognise::RecogniseArgs),
+    /// Measure what is built against what is demanded of it
+    Eval(eval::EvalArgs),
     /// Make the trained models that ship in config/models
     Train(train::TrainArgs),
     /// One role of a running cell (started by `tandem run`)
@@ -74,6 +81,8 @@ pub fn main() -> ExitCode {
         Command::Top(args) => top::top(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Journal(args) => journal::journal(&args),
+        Command::Recognise(args) => recognise::recognise(&args),
+        Command::Eval(args) => eval::eval(&args),
         Command::Train(args) => train::train(&args),
         Command::Role(args) => role::role(&args),
         Command::BenchPeer(args) => bench::peer(&args),

@@ -101,19 +101,15 @@ pub(super) fn recognise(args: &RecogniseArgs) -> u8 {
 fn look(perception: &mut Perception, file: &Path, unit: f64, view: Option<&View>) -> Result<Recognised, String> {
     let shape = recognise::read(file, unit).map_err(|error| error.to_string())?;
     let cloud = recognise::in_camera(&shape, view).map_err(|error| format!("{}: {error}", file.display()))?;
-    let too_little = || format!("{}: {} points in view, too few or without extent; widen --width", file.display(), cloud.len());
+    let too_little =
+        || format!("{}: {} points in view, too few or without extent; widen --width", file.display(), cloud.len());
     perception.recognise(&cloud).ok_or_else(too_little)
 }
 
 /// Name, value and deviation in millimetres of what was measured.
 fn dimensions(d: &FeatureDimensions) -> impl Iterator<Item = (&'static str, f64, f64)> {
-    let all = [
-        ("diameter", d.diameter),
-        ("depth", d.depth),
-        ("length", d.length),
-        ("width", d.width),
-        ("pitch", d.pitch),
-    ];
+    let all =
+        [("diameter", d.diameter), ("depth", d.depth), ("length", d.length), ("width", d.width), ("pitch", d.pitch)];
     all.into_iter().filter(|(_, m)| m.value > 0.0).map(|(name, m)| (name, m.value * 1e3, m.sigma * 1e3))
 }
 

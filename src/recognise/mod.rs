@@ -136,7 +136,8 @@ fn thin(points: &mut Vec<[f32; 3]>) {
     use rand::SeedableRng;
     use rand::seq::SliceRandom;
     if points.len() > POINTS_MAX {
-        points.shuffle(&mut rand_chacha::ChaCha8Rng::seed_from_u64(points.len() as u64));
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(points.len() as u64);
+        points.shuffle(&mut rng);
         points.truncate(POINTS_MAX);
     }
 }
