@@ -14,6 +14,7 @@ pub mod observe;
 pub mod perception;
 pub mod plant;
 pub mod plot;
+pub mod recognise;
 pub mod roles;
 pub mod strategy;
 pub mod supervisor;

@@ -9,10 +9,13 @@ mod check;
 mod doctor;
 mod eval;
 pub mod exit;
+mod features;
 mod journal;
 mod progress;
+mod recognise;
 mod role;
 mod run;
+mod safety;
 mod status;
 mod table;
 mod top;
@@ -46,7 +49,9 @@ enum Command {
     Bench(bench::BenchArgs),
     /// What was done to each box, by whom, when
     Journal(journal::JournalArgs),
-    /// Measure what a cell does against what is demanded of it
+    /// What perception makes of clouds and meshes in files
+    Recognise(recognise::RecogniseArgs),
+    /// Measure what is built against what is demanded of it
     Eval(eval::EvalArgs),
     /// Make the trained models that ship in config/models
     Train(train::TrainArgs),
@@ -77,6 +82,7 @@ pub fn main() -> ExitCode {
         Command::Top(args) => top::top(&args),
         Command::Bench(args) => bench::bench(&args),
         Command::Journal(args) => journal::journal(&args),
+        Command::Recognise(args) => recognise::recognise(&args),
         Command::Eval(args) => eval::eval(&args),
         Command::Train(args) => train::train(&args),
         Command::Role(args) => role::role(&args),

@@ -24,10 +24,10 @@ enum What {
 #[derive(Args)]
 struct EncoderArgs {
     /// Training examples; a tenth as many more for validation, an eighth for the test
-    #[arg(long, default_value_t = 8_000)]
+    #[arg(long, default_value_t = 16_000)]
     samples: usize,
     /// Passes over the examples
-    #[arg(long, default_value_t = 12)]
+    #[arg(long, default_value_t = 20)]
     epochs: usize,
     /// Decides everything that is drawn
     #[arg(long, default_value_t = 1)]
@@ -35,6 +35,9 @@ struct EncoderArgs {
     /// Folder for weights, card and checkpoint
     #[arg(long, default_value = "reports/encoder")]
     out: PathBuf,
+    /// Threads that scan and train; the model does not depend on it [default: all processors]
+    #[arg(long)]
+    threads: Option<std::num::NonZeroUsize>,
     /// Go on from the checkpoint of an unfinished run
     #[arg(long)]
     resume: bool,
@@ -51,6 +54,7 @@ pub(super) fn train(args: &TrainArgs) -> u8 {
         seed: args.seed,
         out: args.out.clone(),
         resume: args.resume,
+        threads: args.threads.or(std::thread::available_parallelism().ok()).map_or(1, std::num::NonZeroUsize::get),
     };
     let bar = ProgressBar::new(0).with_style(
         ProgressStyle::with_template("{msg:28} {wide_bar} {pos}/{len} {eta}")
@@ -91,9 +95,10 @@ fn show(bar: &ProgressBar, epochs: usize, progress: &TrainProgress) {
             bar.set_length((epochs * steps) as u64);
             bar.set_position(((epoch - 1) * steps + step) as u64);
         }
-        TrainProgress::Epoch(epoch, accuracy, points, rate) => {
-            let line =
-                format!("epoch {epoch}: accuracy {accuracy:.4}, points {points:.4} (validation), {rate:.0} clouds/s");
+        TrainProgress::Epoch { epoch, accuracy, points, clouds_a_second } => {
+            let line = format!(
+                "epoch {epoch}: accuracy {accuracy:.4}, points {points:.4} (validation), {clouds_a_second:.0} clouds/s"
+            );
             if bar.is_hidden() { anstream::eprintln!("{line}") } else { bar.println(line) }
         }
         TrainProgress::Test => bar.set_message("measuring on the test split"),

@@ -1,33 +1,41 @@
 //! Points by coordinate, in blocks that compile to vector instructions.
 
+use super::kernel::widest;
+
 /// Lanes of a block.
 const LANES: usize = 8;
 /// Coordinate of the points that fill up the last block: farther than anything.
 const NOWHERE: f32 = 1e18;
 
 /// Points as blocks of x, of y and of z.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Columns {
     blocks: Vec<[[f32; LANES]; 3]>,
 }
 
 impl Columns {
     pub(crate) fn of(points: impl Iterator<Item = [f32; 3]>) -> Self {
-        let mut blocks = Vec::new();
+        let mut out = Self::default();
+        out.fill(points);
+        out
+    }
+
+    /// The same in place; allocates only when it grows.
+    pub(crate) fn fill(&mut self, points: impl Iterator<Item = [f32; 3]>) {
+        self.blocks.clear();
         for (i, p) in points.enumerate() {
             if i % LANES == 0 {
-                blocks.push([[NOWHERE; LANES]; 3]);
+                self.blocks.push([[NOWHERE; LANES]; 3]);
             }
-            if let Some(block) = blocks.last_mut() {
+            if let Some(block) = self.blocks.last_mut() {
                 for (row, v) in block.iter_mut().zip(p) {
                     row[i % LANES] = v;
                 }
             }
         }
-        Self { blocks }
     }
 
-    #[inline]
+    #[inline(always)]
     fn squared([x, y, z]: &[[f32; LANES]; 3], p: [f32; 3]) -> [f32; LANES] {
         std::array::from_fn(|l| {
             let (dx, dy, dz) = (x[l] - p[0], y[l] - p[1], z[l] - p[2]);
@@ -47,38 +55,55 @@ impl Columns {
         }
         least.iter().fold(f32::MAX, |m, d| m.min(*d))
     }
+}
 
-    /// Lowers each gap to the squared distance from `p` and answers the first index at which
-    /// gap × weight is largest. `gaps` and `weights` come from [`Columns::filled`].
-    #[inline]
-    pub(crate) fn farthest(&self, p: [f32; 3], gaps: &mut [[f32; LANES]], weights: &[[f32; LANES]]) -> usize {
-        let mut top = [-1.0_f32; LANES];
-        for ((block, gap), weight) in self.blocks.iter().zip(gaps.iter_mut()).zip(weights) {
-            let d = Self::squared(block, p);
-            for l in 0..LANES {
-                gap[l] = if d[l] < gap[l] { d[l] } else { gap[l] };
-                let reach = gap[l] * weight[l];
-                top[l] = if reach > top[l] { reach } else { top[l] };
-            }
-        }
-        let top = top.iter().fold(-1.0_f32, |m, r| m.max(*r));
-        let at = gaps.iter().zip(weights).position(|(gap, weight)| (0..LANES).any(|l| gap[l] * weight[l] == top));
-        let block = at.unwrap_or(0);
-        let lane = (0..LANES).find(|&l| gaps[block][l] * weights[block][l] == top).unwrap_or(0);
-        block * LANES + lane
-    }
+/// One number a point in blocks; zero past the last point.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Numbers(Vec<[f32; LANES]>);
 
-    /// One number a point in blocks; zero past the last point.
-    pub(crate) fn filled(values: impl Iterator<Item = f32>) -> Vec<[f32; LANES]> {
-        let mut blocks = Vec::new();
+impl Numbers {
+    pub(crate) fn fill(&mut self, values: impl Iterator<Item = f32>) {
+        self.0.clear();
         for (i, v) in values.enumerate() {
             if i % LANES == 0 {
-                blocks.push([0.0; LANES]);
+                self.0.push([0.0; LANES]);
             }
-            if let Some(block) = blocks.last_mut() {
+            if let Some(block) = self.0.last_mut() {
                 block[i % LANES] = v;
             }
         }
-        blocks
+    }
+}
+
+widest! {
+    /// Farthest-point sampling: `chosen` indices of points, from `first` on, each the one whose squared
+    /// distance to those before it, times its weight, is largest. `gaps` is room.
+    fn farthest(points: &Columns, weights: &Numbers, gaps: &mut Numbers, first: usize, chosen: &mut [u16]) {
+        gaps.0.clear();
+        gaps.0.resize(points.blocks.len(), [f32::MAX; LANES]);
+        let mut next = first;
+        for chosen in chosen {
+            *chosen = next as u16;
+            let [x, y, z] = &points.blocks[next / LANES];
+            let p = [x[next % LANES], y[next % LANES], z[next % LANES]];
+            let (mut top, mut at) = ([-1.0_f32; LANES], [0_u32; LANES]);
+            for (b, ((block, gap), weight)) in points.blocks.iter().zip(&mut gaps.0).zip(&weights.0).enumerate() {
+                let d = Columns::squared(block, p);
+                for l in 0..LANES {
+                    gap[l] = if d[l] < gap[l] { d[l] } else { gap[l] };
+                    let reach = gap[l] * weight[l];
+                    let farther = reach > top[l];
+                    top[l] = if farther { reach } else { top[l] };
+                    at[l] = if farther { b as u32 } else { at[l] };
+                }
+            }
+            let mut best = 0;
+            for l in 1..LANES {
+                if top[l] > top[best] || (top[l] == top[best] && at[l] < at[best]) {
+                    best = l;
+                }
+            }
+            next = at[best] as usize * LANES + best;
+        }
     }
 }

@@ -1,75 +1,129 @@
-//! A voxel grid over a scaled cloud, and the local shape of the surface it shows.
+//! The local shape of the surface a scaled cloud shows, from a grid over it.
 
+use super::kernel::widest;
 use super::sample::{cross, dot, squared, sub};
 
-/// Cells along each axis; the grid spans ±1.6 scaled units.
-const CELLS: usize = 32;
+/// Cells along x and y; the grid spans ±1.6 scaled units. Along z, off the dominant plane, a
+/// scan is thin.
+const CELLS: usize = 64;
 const SPAN: f32 = 1.6;
 const WIDTH: f32 = 2.0 * SPAN / CELLS as f32;
+/// Lanes of a block of points.
+const LANES: usize = 8;
+/// Coordinate of the points that fill up a block: farther than anything.
+const NOWHERE: f32 = 1e9;
 /// Neighbours a normal needs.
-const NEIGHBOURS_MIN: u32 = 6;
+const NEIGHBOURS_MIN: f32 = 6.0;
 
-/// Points sorted by cell.
-#[derive(Debug)]
+/// Points sorted by cell, coordinate by coordinate.
+#[derive(Clone, Debug)]
 pub(crate) struct Grid {
-    /// First entry of each cell in `members`, and one past the last.
+    /// First point of each cell, and one past the last.
     start: Vec<u32>,
-    members: Vec<u16>,
-    cell: Vec<u32>,
+    cursor: Vec<u32>,
+    sorted: [Vec<f32>; 3],
+}
+
+impl Default for Grid {
+    fn default() -> Self {
+        Self { start: vec![0; CELLS * CELLS + 1], cursor: vec![0; CELLS * CELLS], sorted: Default::default() }
+    }
 }
 
 impl Grid {
-    pub(crate) fn new() -> Self {
-        Self { start: vec![0; CELLS * CELLS * CELLS + 1], members: Vec::new(), cell: Vec::new() }
-    }
-
-    pub(crate) fn fill(&mut self, points: &[[f32; 3]]) {
+    pub(crate) fn fill(&mut self, points: impl Iterator<Item = [f32; 3]> + Clone) {
         self.start.fill(0);
-        self.cell.clear();
-        self.cell.extend(points.iter().map(|p| index(p.map(axis))));
-        for &cell in &self.cell {
-            self.start[cell as usize + 1] += 1;
+        for p in points.clone() {
+            self.start[index(p) + 1] += 1;
         }
         for i in 1..self.start.len() {
             self.start[i] += self.start[i - 1];
         }
-        self.members.clear();
-        self.members.resize(points.len(), 0);
-        // Backwards, each start serving as its cell's cursor's end: keeps the order within a cell.
-        let mut cursor = self.start.clone();
-        for (i, &cell) in self.cell.iter().enumerate() {
-            let at = &mut cursor[cell as usize];
-            self.members[*at as usize] = i as u16;
+        self.cursor.copy_from_slice(&self.start[..CELLS * CELLS]);
+        let count = self.start[CELLS * CELLS] as usize;
+        for column in &mut self.sorted {
+            // Room to read a whole block from any point.
+            column.resize(count + LANES, NOWHERE);
+            column[count..].fill(NOWHERE);
+        }
+        for p in points {
+            let at = &mut self.cursor[index(p)];
+            for (column, v) in self.sorted.iter_mut().zip(p) {
+                column[*at as usize] = v;
+            }
             *at += 1;
         }
     }
 
-    /// Unit normal, on the side of `towards`, and roughness of the points within `radius`
-    /// (at most half a cell) of `p`. Roughness is 0 on a plane, 1/3 without any direction.
-    pub(crate) fn local_shape(
-        &self,
-        points: &[[f32; 3]],
-        p: [f32; 3],
-        radius: f32,
-        towards: [f32; 3],
-    ) -> ([f32; 3], f32) {
-        debug_assert!(radius <= 0.5 * WIDTH);
-        let low = p.map(|v| axis(v - radius));
-        let high = p.map(|v| axis(v + radius));
-        let cells = (low[0]..=high[0]).flat_map(|x| {
-            (low[1]..=high[1]).flat_map(move |y| (low[2]..=high[2]).map(move |z| index([x, y, z]) as usize))
-        });
-        let members = cells.flat_map(|cell| &self.members[self.start[cell] as usize..self.start[cell + 1] as usize]);
-        let near = members.map(|&i| sub(points[usize::from(i)], p)).filter(|d| squared(*d) < radius * radius);
-        let (count, _, covariance) = moments(near);
-        let back = 1.0 / squared(towards).sqrt().max(1e-9);
-        let towards = towards.map(|v| v * back);
-        if count < NEIGHBOURS_MIN {
-            return (towards, 0.0);
+    /// Shape of the points within `radius` of `p`, seen from the side of `towards`.
+    #[inline(always)]
+    fn local_shape(&self, p: [f32; 3], radius: f32, towards: [f32; 3]) -> LocalShape {
+        let (low, high) = ([0, 1].map(|k| cell(p[k] - radius)), [0, 1].map(|k| cell(p[k] + radius)));
+        let mut sums = [[0.0_f32; LANES]; 10];
+        for y in low[1]..=high[1] {
+            // Cells of a row follow each other.
+            let (from, to) = (self.start[y * CELLS + low[0]] as usize, self.start[y * CELLS + high[0] + 1] as usize);
+            for block in (from..to).step_by(LANES) {
+                let [x, y, z] = [0, 1, 2].map(|k| {
+                    let column = self.sorted[k][block..].first_chunk::<LANES>();
+                    let column = column.unwrap_or(&[NOWHERE; LANES]);
+                    std::array::from_fn::<f32, LANES, _>(|l| column[l] - p[k])
+                });
+                for l in 0..LANES {
+                    let (x, y, z) = (x[l], y[l], z[l]);
+                    // The last block reaches into the next row's cells.
+                    let inside = x * x + y * y + z * z < radius * radius && block + l < to;
+                    let (w, x, y, z) = if inside { (1.0, x, y, z) } else { (0.0, 0.0, 0.0, 0.0) };
+                    for (sum, v) in sums.iter_mut().zip([w, x, y, z, x * x, y * y, z * z, x * y, y * z, z * x]) {
+                        sum[l] += v;
+                    }
+                }
+            }
         }
-        let (normal, roughness) = smallest_axis(covariance);
-        if dot(normal, towards) < 0.0 { (normal.map(|v| -v), roughness) } else { (normal, roughness) }
+        let [count, sx, sy, sz, rest @ ..] = sums.map(|lanes| lanes.iter().sum::<f32>());
+        let back = 1.0 / squared(towards).sqrt().max(1e-9);
+        if count < NEIGHBOURS_MIN {
+            return LocalShape { normal: towards.map(|v| v * back), roughness: 0.0, bulge: 0.0 };
+        }
+        let share = 1.0 / count;
+        let mean = [sx, sy, sz].map(|s| s * share);
+        let covariance = centred(rest.map(|s| s * share), mean);
+        let (normal, least) = smallest_axis(covariance);
+        let normal = if dot(normal, towards) < 0.0 { normal.map(|v| -v) } else { normal };
+        let variance = least * (covariance[0] + covariance[1] + covariance[2]);
+        LocalShape { normal, roughness: variance.max(0.0).sqrt() / radius, bulge: dot(mean, normal) / radius }
     }
+}
+
+widest! {
+    /// Shapes of the surface around points, seen from `eye`.
+    fn local_shapes(grid: &Grid, places: &[[f32; 3]], radius: f32, eye: [f32; 3], shapes: &mut [LocalShape]) {
+        for (p, shape) in places.iter().zip(shapes) {
+            *shape = grid.local_shape(*p, radius, sub(eye, *p));
+        }
+    }
+}
+
+/// What the surface is like around a point.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct LocalShape {
+    /// Unit normal of the tangent plane.
+    pub(crate) normal: [f32; 3],
+    /// Standard deviation from it over the radius: 0 on a plane.
+    pub(crate) roughness: f32,
+    /// How far the middle of the neighbourhood lies outwards of the point, over the radius:
+    /// below 0 on a ridge, above in a groove.
+    pub(crate) bulge: f32,
+}
+
+/// Second moments (xx, yy, zz, xy, yz, zx) about the mean.
+#[inline(always)]
+fn centred(mut products: [f32; 6], mean: [f32; 3]) -> [f32; 6] {
+    for k in 0..3 {
+        products[k] -= mean[k] * mean[k];
+        products[k + 3] -= mean[k] * mean[(k + 1) % 3];
+    }
+    products
 }
 
 /// Count, mean and covariance (xx, yy, zz, xy, yz, zx) of points.
@@ -86,12 +140,7 @@ pub(crate) fn moments(points: impl Iterator<Item = [f32; 3]>) -> (u32, [f32; 3],
     }
     let share = 1.0 / count.max(1) as f32;
     let mean = sum.map(|s| s * share);
-    let mut covariance = [0.0; 6];
-    for k in 0..3 {
-        covariance[k] = products[k] * share - mean[k] * mean[k];
-        covariance[k + 3] = products[k + 3] * share - mean[k] * mean[(k + 1) % 3];
-    }
-    (count, mean, covariance)
+    (count, mean, centred(products.map(|p| p * share), mean))
 }
 
 /// Direction of least variance of a covariance (xx, yy, zz, xy, yz, zx), and that variance's
@@ -122,13 +171,13 @@ pub(crate) fn smallest_axis(c: [f32; 6]) -> ([f32; 3], f32) {
     (normal, (least.max(0.0) / f64::from(trace)) as f32)
 }
 
-#[inline]
-fn axis(v: f32) -> u32 {
+#[inline(always)]
+fn cell(v: f32) -> usize {
     // A float too large or negative saturates in the cast.
-    (((v + SPAN) / WIDTH) as u32).min(CELLS as u32 - 1)
+    (((v + SPAN) * (1.0 / WIDTH)) as usize).min(CELLS - 1)
 }
 
-#[inline]
-fn index([x, y, z]: [u32; 3]) -> u32 {
-    (z * CELLS as u32 + y) * CELLS as u32 + x
+#[inline(always)]
+fn index([x, y, _]: [f32; 3]) -> usize {
+    cell(y) * CELLS + cell(x)
 }

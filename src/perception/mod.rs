@@ -11,12 +11,15 @@
 
 pub mod card;
 mod columns;
+pub mod engine;
 pub mod fit;
 mod grid;
+pub(crate) mod kernel;
 pub mod model;
 pub mod network;
 mod ops;
 pub mod sample;
+pub mod sight;
 
 use std::path::Path;
 
@@ -29,6 +32,7 @@ pub use card::{Card, WindingCard};
 pub use fit::{Fit, fit};
 pub use model::{Answer, CARD_FILE, Model, ModelError, WEIGHTS_FILE};
 pub use sample::{Sample, Sampler};
+pub use sight::Sight;
 
 /// Farthest point of a sound cloud, metres.
 const RANGE_MAX: f32 = 10.0;
@@ -50,7 +54,7 @@ pub struct Recognised {
 #[derive(Debug)]
 pub struct Perception {
     model: Model,
-    sampler: Sampler,
+    sight: Sight,
     /// Sequence number and epoch of the last cloud looked at.
     last: (u64, u64),
 }
@@ -61,7 +65,7 @@ impl Perception {
     /// # Errors
     /// [`ModelError`]: missing, corrupted, or made for another network.
     pub fn load(folder: &Path) -> Result<Self, ModelError> {
-        Ok(Self { model: Model::load(folder)?, sampler: Sampler::new(), last: (0, 0) })
+        Ok(Self { model: Model::load(folder)?, sight: Sight::default(), last: (0, 0) })
     }
 
     /// The model's card.
@@ -110,22 +114,32 @@ impl Perception {
     /// Recognises the feature in a cloud (finite points, metres, camera frame, z along the
     /// view); `None` when there is too little to look at.
     pub fn recognise(&mut self, cloud: &[[f32; 3]]) -> Option<Recognised> {
-        let sample = self.sampler.sample(cloud)?;
-        let answer = self.model.answer(&sample)?;
-        let mut logits = answer.logits;
+        let seen = self.see(cloud)?;
+        let mut logits = seen.logits();
         let mut class = class_of(&logits)?;
-        let mut fit = fit(cloud, &sample, &answer.segment, class).filter(finite);
+        let mut fit = seen.fit(cloud, class).filter(finite);
+        let segment_count = seen.segment().iter().filter(|s| **s).count() as u32;
         if let Some(winding) = fit.and_then(|fit| fit.winding) {
             logits = weigh_winding(logits, class, winding, &self.card().winding);
             let weighed = class_of(&logits)?;
             if weighed != class {
                 class = weighed;
-                fit = fit::fit(cloud, &sample, &answer.segment, class).filter(finite);
+                fit = self.sight.fit(cloud, class).filter(finite);
             }
         }
         let probabilities = self.model.probabilities(&logits);
-        let segment_count = answer.segment.iter().filter(|s| **s).count() as u32;
         Some(Recognised { class, probabilities, segment_count, fit })
+    }
+
+    /// What was seen last.
+    pub fn sight(&self) -> &Sight {
+        &self.sight
+    }
+
+    /// What the network sees in a cloud, at first and closer where the feature is; `None` when
+    /// there is too little to look at.
+    pub fn see(&mut self, cloud: &[[f32; 3]]) -> Option<&Sight> {
+        self.sight.see(&mut self.model, cloud).then_some(&self.sight)
     }
 }
 

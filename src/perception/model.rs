@@ -7,7 +7,8 @@ use candle_core::{DType, Device, Tensor};
 use tandem_msg::FEATURE_CLASSES;
 
 use super::card::Card;
-use super::network::{ARCHITECTURE, Input, Kind, Network, Source};
+use super::engine::Engine;
+use super::network::{ARCHITECTURE, Kind, Source};
 use super::sample::Sample;
 
 /// Name of the weights in a model's folder.
@@ -79,7 +80,7 @@ pub enum ModelError {
 }
 
 /// What a model makes of a sample.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Answer {
     /// Class logits, not yet calibrated.
     pub logits: [f32; FEATURE_CLASSES],
@@ -91,7 +92,7 @@ pub struct Answer {
 #[derive(Debug)]
 pub struct Model {
     card: Card,
-    network: Network,
+    engine: Engine,
 }
 
 impl Model {
@@ -119,8 +120,8 @@ impl Model {
         let wrong = |source| ModelError::Weights { file: file.clone(), source };
         let tensors = candle_core::safetensors::load_buffer(&bytes, &Device::Cpu).map_err(wrong)?;
         let mut stored = Stored { tensors, fault: None };
-        match Network::new(&mut stored) {
-            Ok(network) => Ok(Self { card, network }),
+        match Engine::new(&mut stored) {
+            Ok(engine) => Ok(Self { card, engine }),
             Err(source) => Err(match stored.fault {
                 Some([tensor, found, expected]) => ModelError::Shape { file, tensor, found, expected },
                 None => ModelError::Weights { file, source },
@@ -133,20 +134,13 @@ impl Model {
         &self.card
     }
 
-    /// The network.
-    pub fn network(&self) -> &Network {
-        &self.network
-    }
-
-    /// Asks the model about a sample; `None` if the answer is not finite.
-    pub fn answer(&self, sample: &Sample) -> Option<Answer> {
-        let input = Input::of(&[sample], 1, &Device::Cpu).ok()?;
-        let output = self.network.forward(&input, None).ok()?;
-        let logits = output.class_logits.flatten_all().ok()?.to_vec1::<f32>().ok()?;
-        let logits: [f32; FEATURE_CLASSES] = logits.try_into().ok()?;
-        let segment: Vec<f32> = output.segment_logits.to_vec1().ok()?;
-        let finite = logits.iter().chain(&segment).all(|v| v.is_finite());
-        finite.then(|| Answer { logits, segment: segment.iter().map(|v| *v > 0.0).collect() })
+    /// Asks the model about a sample; false if the answer is not finite.
+    pub fn answer(&mut self, sample: &Sample, out: &mut Answer) -> bool {
+        let (logits, segment) = self.engine.run(sample);
+        out.logits = *logits;
+        out.segment.clear();
+        out.segment.extend(segment.iter().map(|v| *v > 0.0));
+        logits.iter().chain(segment).all(|v| v.is_finite())
     }
 
     /// Calibrated probabilities of logits.

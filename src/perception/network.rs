@@ -1,10 +1,10 @@
 //! The encoder–decoder network (Section 2.1, Fig. 3 of the paper), a point-cloud transformer.
 //!
 //! ```text
-//! 512 points × 7 ── groups 64 × 16 × 10 ── embed 32, 64 ── max over members ── 64 tokens × 64
+//! 512 points × 10 ── groups 64 × 16 × 13 ── embed 32, 64 ── max over members ── 64 tokens × 64
 //!   ── 4 × offset attention (q and k share weights, 16 wide) ── tokens and all four layers: 320
 //!   ── fuse 256 ──┬─ max and mean over tokens: 512 ── 128 ── 8 class logits
-//!                 └─ to each point from its nearest centre + own 10 + cloud 512 ── 64 ── 32 ── 1 segment logit
+//!                 └─ to each point from its nearest 3 centres + own 13 + cloud 512 ── 64 ── 32 ── 1 segment logit
 //! ```
 //!
 //! Every weight is a plain matrix input × output, so that rows × channels flow through
@@ -18,26 +18,37 @@ use candle_core::{D, DType, Device, Result, Tensor};
 use tandem_msg::FEATURE_CLASSES;
 
 use super::ops::{AffineRelu, BatchNormRelu, BatchStatistics, MaxOverMembers, Softmax};
-use super::sample::{CENTRES, CHANNELS, NEIGHBOURS, POINTS, Sample};
+use super::sample::{CENTRES, CHANNELS, HOMES, NEIGHBOURS, POINTS, Sample};
 
 /// Name of the architecture, in cards.
-pub const ARCHITECTURE: &str = "pct-512-64x16-d64-4";
+pub const ARCHITECTURE: &str = "pct-512x10-64x16-d64-4";
 /// Width of a group member.
-const EMBED: usize = 32;
+pub(crate) const EMBED: usize = 32;
 /// Width of a token.
-const WIDTH: usize = 64;
+pub(crate) const WIDTH: usize = 64;
 /// Width of queries and keys.
-const KEY_WIDTH: usize = 16;
-const LAYERS: usize = 4;
-const FUSED: usize = 256;
-const CLASS_HIDDEN: usize = 128;
-const SEGMENT_HIDDEN: [usize; 2] = [64, 32];
+pub(crate) const KEY_WIDTH: usize = 16;
+pub(crate) const LAYERS: usize = 4;
+pub(crate) const FUSED: usize = 256;
+pub(crate) const CLASS_HIDDEN: usize = 128;
+pub(crate) const SEGMENT_HIDDEN: [usize; 2] = [64, 32];
 /// Numbers a group member, and numbers a point brings to the segmentation head.
-const MEMBER: usize = CHANNELS + 3;
+pub(crate) const MEMBER: usize = CHANNELS + 3;
 /// Share of a batch in the running statistics.
-const MOMENTUM: f32 = 0.1;
-/// Brings places inside a group and roughness to the size of the other inputs.
-const ZOOM: [f32; 2] = [5.0, 8.0];
+pub(crate) const MOMENTUM: f32 = 0.1;
+/// Brings places inside a group, and the local shape, to the size of the other inputs.
+const ZOOM: f32 = 5.0;
+const SHAPE_ZOOM: f32 = 4.0;
+
+/// What the network reads of a point `p` seen from a centre `c`: place from the centre, place,
+/// normal, local shape.
+#[inline(always)]
+pub(crate) fn member(p: &[f32; CHANNELS], c: &[f32; CHANNELS]) -> [f32; MEMBER] {
+    let [x, y, z, nx, ny, nz, fine, coarse, bulge, alignment] = *p;
+    let [u, v, w] = [x - c[0], y - c[1], z - c[2]].map(|d| d * ZOOM);
+    let shape = [fine, coarse, bulge, 1.0 - alignment].map(|s| s * SHAPE_ZOOM);
+    [u, v, w, x, y, z, nx, ny, nz, shape[0], shape[1], shape[2], shape[3]]
+}
 
 /// Where the network's numbers come from.
 pub trait Source {
@@ -149,14 +160,14 @@ impl Attention {
 #[derive(Clone, Debug)]
 pub struct Input {
     batch: usize,
-    /// batch·centres·neighbours × 10.
+    /// batch·centres·neighbours × 13.
     members: Tensor,
     /// batch·centres × 3.
     places: Tensor,
-    /// batch·points/stride × 10.
+    /// batch·points/stride × 13.
     points: Tensor,
-    /// Row of each of these points' centre.
-    home: Tensor,
+    /// Row of each of these points' centres, and their shares in it.
+    homes: [(Tensor, Tensor); HOMES],
 }
 
 impl Input {
@@ -169,32 +180,33 @@ impl Input {
         let mut members = Vec::with_capacity(batch * CENTRES * NEIGHBOURS * MEMBER);
         let mut places = Vec::with_capacity(batch * CENTRES * 3);
         let mut points = Vec::with_capacity(batch * POINTS.div_ceil(stride) * MEMBER);
-        let mut home = Vec::with_capacity(batch * POINTS.div_ceil(stride));
-        let zoomed = |p: &[f32; CHANNELS], c: &[f32; CHANNELS], out: &mut Vec<f32>| {
-            out.extend((0..3).map(|k| (p[k] - c[k]) * ZOOM[0]));
-            out.extend_from_slice(&p[..6]);
-            out.push(p[6] * ZOOM[1]);
-        };
+        let mut homes: [(Vec<u32>, Vec<f32>); HOMES] = Default::default();
         for (b, sample) in samples.iter().enumerate() {
             for (centre, group) in sample.centres.iter().zip(&sample.groups) {
                 let c = &sample.points[usize::from(*centre)];
                 places.extend_from_slice(&c[..3]);
-                for &member in group {
-                    zoomed(&sample.points[usize::from(member)], c, &mut members);
+                for &index in group {
+                    members.extend_from_slice(&member(&sample.points[usize::from(index)], c));
                 }
             }
-            for (p, &token) in sample.points.iter().zip(&sample.home).step_by(stride) {
-                let c = &sample.points[usize::from(sample.centres[usize::from(token)])];
-                zoomed(p, c, &mut points);
-                home.push((b * CENTRES) as u32 + u32::from(token));
+            for (i, p) in sample.points.iter().enumerate().step_by(stride) {
+                let c = &sample.points[usize::from(sample.centres[usize::from(sample.home[i][0])])];
+                points.extend_from_slice(&member(p, c));
+                for (k, (rows, shares)) in homes.iter_mut().enumerate() {
+                    rows.push((b * CENTRES) as u32 + u32::from(sample.home[i][k]));
+                    shares.push(sample.share[i][k]);
+                }
             }
         }
+        let count = points.len() / MEMBER;
+        let [a, b, c]: [Result<_>; HOMES] =
+            homes.map(|(rows, shares)| Ok((Tensor::new(rows, device)?, Tensor::from_vec(shares, (count, 1), device)?)));
         Ok(Self {
             batch,
             members: Tensor::from_vec(members, (batch * CENTRES * NEIGHBOURS, MEMBER), device)?,
             places: Tensor::from_vec(places, (batch * CENTRES, 3), device)?,
-            points: Tensor::from_vec(points, (home.len(), MEMBER), device)?,
-            home: Tensor::new(home, device)?,
+            points: Tensor::from_vec(points, (count, MEMBER), device)?,
+            homes: [a?, b?, c?],
         })
     }
 }
@@ -280,17 +292,15 @@ impl Network {
         // Linear layers commute with the spreading of tokens and cloud to points: they run before it.
         let context = fused.matmul(&self.segment_token)?.reshape((batch, CENTRES, SEGMENT_HIDDEN[0]))?;
         let context = context.broadcast_add(&cloud.matmul(&self.segment_cloud)?.unsqueeze(1)?)?;
-        let context = context.reshape((batch * CENTRES, SEGMENT_HIDDEN[0]))?.index_select(&input.home, 0)?;
-        let own = input.points.matmul(&self.segment_point.weight)?;
-        let hidden = self.segment_point.normalise(&(own + context)?, training)?;
+        let context = context.reshape((batch * CENTRES, SEGMENT_HIDDEN[0]))?;
+        let mut own = input.points.matmul(&self.segment_point.weight)?;
+        for (rows, shares) in &input.homes {
+            own = (own + context.index_select(rows, 0)?.broadcast_mul(shares)?)?;
+        }
+        let hidden = self.segment_point.normalise(&own, training)?;
         let hidden = self.segment_hidden.forward(&hidden, training)?;
         let segment_logits = hidden.matmul(&self.segment_out)?.broadcast_add(&self.segment_bias)?.flatten_all()?;
         Ok(Output { class_logits, segment_logits })
-    }
-
-    /// Width of the dropout mask [`Network::forward`] takes.
-    pub fn dropout_width(&self) -> usize {
-        CLASS_HIDDEN
     }
 
     /// Running statistics by name, in a fixed order, as they are stored beside the weights.

@@ -7,13 +7,14 @@
 mod adam;
 mod augment;
 mod dataset;
-mod loss;
 mod parameters;
+mod pass;
 mod report;
 mod specimen;
 mod train;
 
-pub use dataset::{Example, Split, example};
+pub use dataset::{Example, Look, Split, example};
+pub use report::measure;
 pub use specimen::Specimen;
 pub use train::{TrainError, TrainOptions, TrainProgress, train};
 

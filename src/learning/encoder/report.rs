@@ -2,17 +2,16 @@
 
 use std::path::Path;
 
-use candle_core::Device;
 use nalgebra::Vector3;
 use tandem_msg::{Coded, FEATURE_CLASSES, FeatureClass, FeatureDimensions};
 
 use super::dataset::{Example, Split, example};
 use super::train::TrainError;
 use crate::perception::card::Metrics;
+use crate::perception::engine::Engine;
 use crate::perception::fit::quantile;
 use crate::perception::model::softmax;
-use crate::perception::network::{Input, Network};
-use crate::perception::{Model, Perception, Recognised, Sampler, WindingCard, class_of, fit, weigh_winding};
+use crate::perception::{Card, Perception, Recognised, Sampler, Sight, WindingCard, class_of, weigh_winding};
 
 /// What a network answers to a set of examples.
 pub(crate) struct Answers {
@@ -23,21 +22,23 @@ pub(crate) struct Answers {
 }
 
 impl Answers {
-    pub(crate) fn of(network: &Network, examples: &[Example]) -> Result<Self, TrainError> {
+    pub(crate) fn of(engine: &mut Engine, examples: &[Example]) -> Self {
         let mut out = Self { logits: Vec::new(), classes: Vec::new(), points_right: 0, points: 0 };
-        for batch in examples.chunks(32) {
-            let samples: Vec<_> = batch.iter().map(|e| &e.sample).collect();
-            let output = network.forward(&Input::of(&samples, 1, &Device::Cpu)?, None)?;
-            for row in output.class_logits.to_vec2::<f32>()? {
-                out.logits.push(std::array::from_fn(|c| row.get(c).copied().unwrap_or(f32::NAN)));
-            }
-            out.classes.extend(batch.iter().map(|e| e.class.code() as usize));
-            let marks = batch.iter().flat_map(|e| &e.segment);
-            let segment = output.segment_logits.to_vec1::<f32>()?;
+        for example in examples {
+            let (mut logits, segment) = {
+                let (logits, segment) = engine.run(&example.look.sample);
+                (*logits, segment)
+            };
             out.points += segment.len();
-            out.points_right += segment.iter().zip(marks).filter(|(s, m)| (**s > 0.0) == **m).count();
+            out.points_right += segment.iter().zip(&example.look.segment).filter(|(s, m)| (**s > 0.0) == **m).count();
+            if let Some(closer) = &example.closer {
+                let (again, _) = engine.run(&closer.sample);
+                logits = std::array::from_fn(|c| 0.5 * (logits[c] + again[c]));
+            }
+            out.logits.push(logits);
+            out.classes.push(example.class.code() as usize);
         }
-        Ok(out)
+        out
     }
 
     pub(crate) fn accuracy(&self) -> f64 {
@@ -58,28 +59,19 @@ pub(crate) fn best(values: &[f32; FEATURE_CLASSES]) -> usize {
 /// Share of sure answers that may be wrong.
 const WRONG_MAX: f64 = 0.025;
 
-/// What calibration decides.
-pub(crate) struct Calibration {
-    pub(crate) temperature: f64,
-    pub(crate) winding: WindingCard,
-    pub(crate) threshold: f64,
-}
-
 /// Calibrates on the validation split: the temperature and the weight of the winding with the
 /// least negative log-likelihood, then the smallest probability above which at most one
 /// answer in forty is wrong.
-pub(crate) fn calibrate(network: &Network, seed: u64, count: usize) -> Result<Calibration, TrainError> {
+pub(crate) fn calibrate(folder: &Path, seed: u64, count: usize, card: &mut Card) -> Result<(), TrainError> {
+    let mut perception = Perception::load(folder)?;
     let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
     let mut cases = Vec::with_capacity(count);
     for index in 0..count as u64 {
         let truth = example(seed, Split::Validation, index, &mut sampler, &mut cloud);
-        let output = network.forward(&Input::of(&[&truth.sample], 1, &Device::Cpu)?, None)?;
-        let row = output.class_logits.flatten_all()?.to_vec1::<f32>()?;
-        let logits: [f32; FEATURE_CLASSES] = std::array::from_fn(|c| row.get(c).copied().unwrap_or(f32::NAN));
-        let segment: Vec<bool> = output.segment_logits.to_vec1::<f32>()?.iter().map(|v| *v > 0.0).collect();
-        let Some(class) = class_of(&logits) else { continue };
-        let winding = fit(&cloud, &truth.sample, &segment, class).and_then(|fit| fit.winding);
-        cases.push((logits, class, winding, truth.class.code() as usize));
+        let Some(seen) = perception.see(&cloud) else { continue };
+        let Some(class) = class_of(&seen.logits()) else { continue };
+        let winding = seen.fit(&cloud, class).and_then(|fit| fit.winding);
+        cases.push((seen.logits(), class, winding, truth.class.code() as usize));
     }
     let weighed = |card: &WindingCard| -> Vec<([f32; FEATURE_CLASSES], usize)> {
         let each = cases.iter().map(|(logits, class, winding, truth)| {
@@ -92,7 +84,7 @@ pub(crate) fn calibrate(network: &Network, seed: u64, count: usize) -> Result<Ca
     };
     let mut best = (f64::MAX, WindingCard::default(), 1.0);
     for gain in [0.0, 2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 60.0] {
-        for level in 1..12 {
+        for level in 1..16 {
             let card = WindingCard { gain, level: 0.025 * f64::from(level) };
             let cases = weighed(&card);
             for step in 0..=40 {
@@ -104,8 +96,9 @@ pub(crate) fn calibrate(network: &Network, seed: u64, count: usize) -> Result<Ca
             }
         }
     }
-    let (_, winding, temperature) = best;
-    Ok(Calibration { temperature, winding, threshold: threshold(&weighed(&winding), temperature) })
+    (_, card.winding, card.temperature) = best;
+    card.threshold = threshold(&weighed(&card.winding), card.temperature);
+    Ok(())
 }
 
 fn threshold(cases: &[([f32; FEATURE_CLASSES], usize)], temperature: f64) -> f64 {
@@ -127,18 +120,18 @@ fn threshold(cases: &[([f32; FEATURE_CLASSES], usize)], temperature: f64) -> f64
 }
 
 /// Measures the model in a folder on the test split, as it is used in a cell: cloud to feature.
-pub(crate) fn measure(folder: &Path, seed: u64, count: usize) -> Result<Metrics, TrainError> {
+///
+/// # Errors
+/// [`TrainError::Model`] when the model is refused.
+pub fn measure(folder: &Path, seed: u64, count: usize) -> Result<Metrics, TrainError> {
     let mut perception = Perception::load(folder)?;
-    let model = Model::load(folder)?;
     let threshold = perception.card().threshold;
     let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
     let mut tally = Tally::default();
     for index in 0..count as u64 {
         let truth = example(seed, Split::Test, index, &mut sampler, &mut cloud);
-        let (Some(answer), Some(recognised)) = (model.answer(&truth.sample), perception.recognise(&cloud)) else {
-            continue;
-        };
-        tally.add(&truth, &answer.segment, &recognised, threshold);
+        let Some(recognised) = perception.recognise(&cloud) else { continue };
+        tally.add(&truth, perception.sight(), &recognised, threshold);
     }
     Ok(tally.metrics())
 }
@@ -164,7 +157,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn add(&mut self, truth: &Example, segment: &[bool], answer: &Recognised, threshold: f64) {
+    fn add(&mut self, truth: &Example, seen: &Sight, answer: &Recognised, threshold: f64) {
         self.count += 1.0;
         let right = answer.class == truth.class;
         self.confusion[truth.class.code() as usize][answer.class.code() as usize] += 1;
@@ -179,13 +172,14 @@ impl Tally {
             self.sure_right += f64::from(u8::from(right));
         }
         let (mut both, mut either) = (0.0, 0.0);
-        for (said, is) in segment.iter().zip(&truth.segment) {
+        for (point, said) in seen.segment().iter().enumerate() {
+            let is = truth.on_feature[seen.source(point)];
             self.points += 1.0;
-            self.points_right += f64::from(u8::from(said == is));
-            both += f64::from(u8::from(*said && *is));
-            either += f64::from(u8::from(*said || *is));
+            self.points_right += f64::from(u8::from(*said == is));
+            both += f64::from(u8::from(*said && is));
+            either += f64::from(u8::from(*said || is));
         }
-        if truth.segment.iter().any(|s| *s) {
+        if truth.look.segment.iter().any(|s| *s) {
             self.ious.push(both / f64::max(either, 1.0));
         }
         // Where there is nothing to locate, there is no error of locating it.

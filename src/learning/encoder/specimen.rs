@@ -17,12 +17,16 @@ use crate::plant::solid::{Clutter, Form, Other, Solid, Surroundings};
 
 /// Smallest and largest feature, metres.
 const SIZE: [f64; 2] = [0.004, 0.045];
-/// Tilt of the view off the feature's axis, radians.
-const TILT: [f64; 2] = [0.17, 0.70];
+/// Tilt of the view off the feature's axis, radians: straight from above a bore shows no wall.
+const TILT: [f64; 2] = [0.22, 0.70];
 /// Half the view in extents of the feature.
 const VIEW: [f64; 2] = [1.1, 2.1];
+/// How far off the feature the camera may be aimed, in half widths of the view.
+const AIM: f64 = 0.28;
+/// Turns of a thread there are at least: less is a groove.
+const TURNS_MIN: f64 = 2.5;
 /// Range noise in half widths of the view, and its limits in metres.
-const NOISE: [f64; 2] = [0.001, 0.006];
+const NOISE: [f64; 2] = [0.001, 0.0055];
 const NOISE_LIMITS: [f64; 2] = [20e-6, 250e-6];
 
 /// A part, what lies around it, and how it is looked at.
@@ -63,11 +67,17 @@ impl Specimen {
         let part_from_feature = Isometry3::from_parts(Translation3::new(at[0], at[1], top), about_z(turn));
         let solid = Solid::with_form(&body, &feature, &form, &part_from_feature);
 
-        let half_width = size * log_uniform(VIEW, rng);
+        let mut half_width = size * log_uniform(VIEW, rng);
         let sigma = (half_width * log_uniform(NOISE, rng)).clamp(NOISE_LIMITS[0], NOISE_LIMITS[1]);
         let camera =
             Camera { range_sigma: sigma, dropout: rng.random_range(0.0..0.08), outliers: rng.random_range(0.0..0.008) };
-        let (off, toward) = (0.4 * half_width * rng.random::<f64>().sqrt(), rng.random_range(0.0..TAU));
+        let mut reach = AIM * half_width;
+        if class == FeatureClass::Slot {
+            // Mostly both its ends are in view.
+            half_width = half_width.max(0.55 * feature.length);
+            reach = reach.min((half_width - 0.5 * feature.length).max(0.08 * half_width));
+        }
+        let (off, toward) = (reach * rng.random::<f64>().sqrt(), rng.random_range(0.0..TAU));
         let aim = [off * toward.cos(), off * toward.sin(), 0.0];
         let focus = rng.random_range(0.25..0.5);
 
@@ -124,10 +134,10 @@ fn feature(class: FeatureClass, rng: &mut ChaCha8Rng) -> (FeatureGeometry, Form)
     match class {
         FeatureClass::ThreadedHole | FeatureClass::SmoothHole => {
             g.diameter = size;
-            g.depth = size * log_uniform([0.22, 2.2], rng);
-            g.chamfer = of(rng, -0.08, 0.12).max(0.0);
+            g.depth = size * log_uniform([0.25, 2.2], rng);
+            g.chamfer = of(rng, -0.08, 0.12).max(0.0).min(0.3 * g.depth);
             if class == FeatureClass::ThreadedHole {
-                g.pitch = of(rng, 0.09, 0.19);
+                g.pitch = of(rng, 0.08, 0.19).min((g.depth - g.chamfer) / TURNS_MIN);
             }
         }
         FeatureClass::ThreadedAxis | FeatureClass::SmoothAxis => {
@@ -135,7 +145,7 @@ fn feature(class: FeatureClass, rng: &mut ChaCha8Rng) -> (FeatureGeometry, Form)
             g.depth = of(rng, 0.5, 2.8);
             g.chamfer = of(rng, -0.05, 0.12).max(0.0).min(0.4 * g.depth);
             if class == FeatureClass::ThreadedAxis {
-                g.pitch = of(rng, 0.09, 0.19);
+                g.pitch = of(rng, 0.08, 0.19).min((g.depth - g.chamfer) / TURNS_MIN);
             }
         }
         FeatureClass::Slot => {
@@ -279,7 +289,9 @@ fn lying_on(
 /// A stray object beside the feature, on the part or beside it, clear of the feature.
 fn stray(size: f64, half_width: f64, height: f64, rng: &mut ChaCha8Rng) -> Clutter {
     let big = half_width * rng.random_range(0.08..0.45);
-    let away = 0.75 * size + 1.5 * big + half_width * rng.random_range(0.0..0.8);
+    // What is nearest to the middle of the view is what is asked about.
+    let near = (0.75 * size + 1.5 * big).max(0.5 * half_width + 1.3 * big);
+    let away = near + half_width * rng.random_range(0.0..0.7);
     let turn = rng.random_range(0.0..TAU);
     let z = if rng.random_bool(0.7) { 0.0 } else { -rng.random::<f64>() * height };
     let centre = [away * turn.cos(), away * turn.sin(), z];

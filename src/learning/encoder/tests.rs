@@ -3,18 +3,18 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use candle_core::{Device, Tensor};
+use candle_core::{D, Device, Tensor};
 use nalgebra::{Isometry3, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tandem_config::{Body, FeatureGeometry};
-use tandem_msg::{Coded, Feature, FeatureClass, Header, PointCloud, Pose, Recognition, Stamp};
+use tandem_msg::{Coded, FEATURE_CLASSES, Feature, FeatureClass, Header, PointCloud, Pose, Recognition, Stamp};
 
-use super::dataset::{Example, Split, example};
-use super::loss::loss;
+use super::dataset::{Example, Look, Split, example};
 use super::parameters::Parameters;
-use super::train::{Run, SEGMENT_STRIDE, TrainOptions, train};
-use crate::perception::network::{Input, Network};
+use super::pass::{Pass, SEGMENT, SEGMENT_STRIDE, SMOOTHING};
+use super::train::{Run, TrainOptions, train};
+use crate::perception::network::{CLASS_HIDDEN, Input, Network, Output};
 use crate::perception::{CARD_FILE, Model, ModelError, Perception, Sampler, WEIGHTS_FILE};
 use crate::plant::camera::{Camera, TILT, View, feature_from_camera, half_width};
 use crate::plant::solid::{Solid, Surroundings};
@@ -28,23 +28,102 @@ fn examples(seed: u64, split: Split, count: u64) -> Vec<Example> {
     (0..count).map(|index| example(seed, split, index, &mut sampler, &mut cloud)).collect()
 }
 
-/// No operation on the way cuts the gradient: every variable gets one that is not all zero.
+/// The loss in candle's operations: cross-entropy of smoothed classes, and of the points.
+fn loss(output: &Output, looks: &[&Look]) -> candle_core::Result<Tensor> {
+    let batch = looks.len();
+    let mut labels = vec![SMOOTHING / FEATURE_CLASSES as f32; batch * FEATURE_CLASSES];
+    for (b, look) in looks.iter().enumerate() {
+        labels[b * FEATURE_CLASSES + look.class.code() as usize] += 1.0 - SMOOTHING;
+    }
+    let labels = Tensor::from_vec(labels, (batch, FEATURE_CLASSES), &Device::Cpu)?;
+    let logits = &output.class_logits;
+    let shifted = logits.broadcast_sub(&logits.max_keepdim(D::Minus1)?.detach())?;
+    let log_sum = shifted.exp()?.sum_keepdim(D::Minus1)?.log()?;
+    let class = (labels * shifted.broadcast_sub(&log_sum)?)?.sum_all()?.affine(-1.0 / batch as f64, 0.0)?;
+    let segments = looks.iter().flat_map(|look| look.segment.iter().step_by(SEGMENT_STRIDE));
+    let marks: Vec<f32> = segments.map(|s| f32::from(u8::from(*s))).collect();
+    let marks = Tensor::from_vec(marks.clone(), marks.len(), &Device::Cpu)?;
+    // log(1 + exp(x)) − x·y, written so that neither end overflows.
+    let x = &output.segment_logits;
+    let soft = (x.relu()? + (x.abs()?.neg()?.exp()? + 1.0)?.log()?)?;
+    class + ((soft - (x * marks)?)?.mean_all()? * f64::from(SEGMENT))?
+}
+
+/// Loss and gradient of the pass that trains are those of the network in candle, for every
+/// variable; and no operation on the way cuts a gradient.
 #[test]
-fn gradients_reach_every_variable() {
+fn the_pass_has_the_gradients_of_the_network() {
     let mut parameters = Parameters::fresh(1);
     let network = Network::new(&mut parameters).expect("fresh numbers have the right shapes");
-    let examples = examples(1, Split::Train, 8);
-    let samples: Vec<_> = examples.iter().map(|e| &e.sample).collect();
+    let examples = examples(1, Split::Train, 16);
+    let looks: Vec<&Look> = examples.iter().map(|e| e.closer.as_ref().unwrap_or(&e.look)).collect();
+    let samples: Vec<_> = looks.iter().map(|look| &look.sample).collect();
     let input = Input::of(&samples, SEGMENT_STRIDE, &Device::Cpu).expect("samples are well formed");
-    let mask = Tensor::ones((8, network.dropout_width()), candle_core::DType::F32, &Device::Cpu).expect("small");
-    let output = network.forward(&input, Some(&mask)).expect("shapes agree");
-    let gradients = loss(&output, &examples).and_then(|l| l.backward()).expect("all operations have gradients");
+    let mask: Vec<f32> = (0..16 * CLASS_HIDDEN).map(|i| if i % 3 == 0 { 0.0 } else { 1.5 }).collect();
+    let dropout = Tensor::from_vec(mask.clone(), (16, CLASS_HIDDEN), &Device::Cpu).expect("small");
+    let output = network.forward(&input, Some(&dropout)).expect("shapes agree");
+    let expected = loss(&output, &looks).expect("shapes agree");
+    let gradients = expected.backward().expect("all operations have gradients");
+    let expected = expected.to_scalar::<f32>().expect("a number");
+
+    let run = Run::on(Parameters::fresh(1)).expect("the same numbers");
+    let mut pass = Pass::default();
+    pass.run(&run.plan, &run.parameters, &looks, &mask, 0);
+    assert!((pass.loss - expected).abs() < 1e-4 * expected, "loss {} against {expected}", pass.loss);
     assert!(parameters.variables.len() > 40, "{} variables", parameters.variables.len());
-    for (name, variable) in &parameters.variables {
-        let gradient = gradients.get(variable).unwrap_or_else(|| panic!("{name}: no gradient"));
-        let largest = gradient.abs().and_then(|g| g.flatten_all()?.max(0)?.to_scalar::<f32>()).expect("numbers");
-        assert!(largest > 0.0 && largest.is_finite(), "{name}: gradient {largest}");
+    let numbers = |t: &Tensor| t.flatten_all().and_then(|t| t.to_vec1::<f32>()).expect("f32");
+    for (name, span) in run.spans[0].iter() {
+        let gradient = gradients.get(&parameters.variables[name]).unwrap_or_else(|| panic!("{name}: no gradient"));
+        let (gradient, own) = (numbers(gradient), &pass.gradient[span.clone()]);
+        let size = gradient.iter().map(|g| g * g).sum::<f32>().sqrt();
+        let off = gradient.iter().zip(own).map(|(g, o)| (g - o) * (g - o)).sum::<f32>().sqrt();
+        assert!(size > 0.0 && size.is_finite(), "{name}: gradient {size}");
+        assert!(off < 1e-3 * size, "{name}: {off} off a gradient of {size}");
     }
+    // So are the statistics of the batch, from which the running ones start at 0 and 1.
+    for (name, running) in network.statistics().expect("plain tensors") {
+        let start = if name.ends_with("variance") { 1.0 } else { 0.0 };
+        for (moved, batch) in numbers(&running).iter().zip(&pass.statistics[run.spans[1].of(&name)]) {
+            let expected = start + 0.1 * (batch - start);
+            assert!((moved - expected).abs() < 1e-3 * expected.abs().max(1.0), "{name}: {moved}, {expected}");
+        }
+    }
+}
+
+/// Inference without tensors answers what the network in candle does.
+#[test]
+fn the_engine_answers_what_the_network_does() {
+    let folder = shipped();
+    let tensors = candle_core::safetensors::load(folder.join(WEIGHTS_FILE), &Device::Cpu).expect("readable");
+    let stored = || Parameters::stored(tensors.clone().into_iter().collect());
+    let network = Network::new(&mut stored()).expect("the shipped weights fit");
+    let mut engine = crate::perception::engine::Engine::new(&mut stored()).expect("the shipped weights fit");
+    for example in examples(5, Split::Test, 24) {
+        let input = Input::of(&[&example.look.sample], 1, &Device::Cpu).expect("samples are well formed");
+        let output = network.forward(&input, None).expect("shapes agree");
+        let (logits, segment) = engine.run(&example.look.sample);
+        let expected = [output.class_logits.flatten_all(), Ok(output.segment_logits)]
+            .map(|t| t.and_then(|t| t.to_vec1::<f32>()).expect("f32"));
+        let pairs = logits.iter().zip(&expected[0]).chain(segment.iter().zip(&expected[1]));
+        let off = pairs.map(|(own, theirs)| (own - theirs).abs() / theirs.abs().max(1.0)).fold(0.0, f32::max);
+        assert!(off < 1e-4, "{}: {off} off", example.class);
+    }
+}
+
+/// Any number of threads trains the same network, bit for bit.
+#[test]
+fn threads_change_nothing() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let training = examples(3, Split::Train, 64);
+    let [one, two] = [1, 2].map(|threads| {
+        let options = TrainOptions { threads, ..options(folder.path(), 1) };
+        let mut run = Run::begin(&options, Path::new("none")).expect("fresh");
+        run.epoch(&training, &options, &mut |_| {});
+        (run.parameters, run.statistics)
+    });
+    assert!(one == two);
+    let made = super::dataset::examples(3, Split::Train, 64, 2, &mut |_| {});
+    assert!(made.iter().zip(&training).all(|(a, b)| a.look == b.look && a.closer == b.closer));
 }
 
 /// An example follows from seed, split and number alone, and shows its feature.
@@ -53,15 +132,15 @@ fn examples_repeat_and_show_their_feature() {
     let (first, again) = (examples(9, Split::Test, 16), examples(9, Split::Test, 16));
     let other = examples(9, Split::Validation, 16);
     for ((a, b), c) in first.iter().zip(&again).zip(&other) {
-        assert_eq!(a.sample, b.sample);
-        assert_ne!(a.sample, c.sample, "splits are disjoint");
-        let shown = a.segment.iter().filter(|s| **s).count();
+        assert_eq!((&a.look, &a.closer), (&b.look, &b.closer));
+        assert_ne!(a.look, c.look, "splits are disjoint");
+        let shown = a.look.segment.iter().filter(|s| **s).count();
         assert!(a.class == FeatureClass::Other || shown >= 24, "{}: {shown} points", a.class);
     }
 }
 
 fn options(out: &Path, epochs: usize) -> TrainOptions {
-    TrainOptions { samples: 64, epochs, seed: 3, out: out.to_owned(), resume: false }
+    TrainOptions { samples: 64, epochs, seed: 3, out: out.to_owned(), resume: false, threads: 2 }
 }
 
 /// A small run learns what it is shown, and its model loads.
@@ -69,13 +148,13 @@ fn options(out: &Path, epochs: usize) -> TrainOptions {
 fn a_small_run_beats_chance() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let mut losses = BTreeMap::new();
-    let card = train(&options(folder.path(), 14), &mut |p| {
+    let card = train(&options(folder.path(), 24), &mut |p| {
         if let super::TrainProgress::Step(epoch, _, _, loss) = p {
             losses.insert(*epoch, *loss);
         }
     })
     .expect("it trains");
-    let (first, last) = (losses[&1], losses[&14]);
+    let (first, last) = (losses[&1], losses[&24]);
     println!("loss {first:.2} -> {last:.2}, accuracy on 64 others {:.2} (chance 0.125)", card.metrics.accuracy);
     assert!(last < 0.8 * first, "loss {first} -> {last}");
     assert!(card.metrics.accuracy > 0.2, "{}", card.metrics.accuracy);
@@ -94,11 +173,11 @@ fn a_resumed_run_is_the_same_run() {
         weights.into_iter().map(|(n, t)| (n, t.flatten_all().and_then(|t| t.to_vec1()).expect("f32"))).collect()
     };
     let mut whole = Run::begin(&options, &file).expect("fresh");
-    whole.epoch(&training, 4, &options, &mut |_| {}).expect("trains");
+    whole.epoch(&training, &options, &mut |_| {});
     whole.save(&file, &options).expect("saves");
-    whole.epoch(&training, 4, &options, &mut |_| {}).expect("trains");
+    whole.epoch(&training, &options, &mut |_| {});
     let mut resumed = Run::begin(&options, &file).expect("resumes");
-    resumed.epoch(&training, 4, &options, &mut |_| {}).expect("trains");
+    resumed.epoch(&training, &options, &mut |_| {});
     assert!(numbers(&whole) == numbers(&resumed));
 
     let other = TrainOptions { seed: 4, ..options };

@@ -4,13 +4,18 @@ use nalgebra::{Vector2, Vector3};
 use tandem_msg::FeatureDimensions;
 
 use super::plane::Plane;
-use super::{Dense, Fit, Frame, Local, measured, quantile};
+use super::{Dense, Fit, Frame, Local, measured, quantile, wide};
+use crate::perception::sample::Sample;
 
 /// Directions tried over a right angle.
 const DIRECTIONS: usize = 60;
+/// What the slopes of a hook count against its overhang.
+const SLOPE_WEIGHT: f64 = 0.4;
+/// Upward components of the normals of sloping faces.
+const SLOPING: std::ops::Range<f64> = 0.2..0.93;
 
 /// Fits a buckle: direction, centre of the foot, length, width, height.
-pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
+pub(crate) fn fit(plane: &Plane, dense: &Dense, sample: &Sample, segment: &[bool]) -> Option<Fit> {
     let middle = dense.feature.iter().sum::<Vector3<f64>>() / dense.feature.len() as f64;
     let frame = Frame::on(middle - plane.normal * plane.height(middle), plane.normal);
     let local: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
@@ -25,7 +30,9 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
     let extents = |along: Vector2<f64>, low: f64, high: f64| {
         let mut values: Vec<f64> =
             upper.iter().filter(|p| p.z >= low && p.z <= high).map(|p| along.dot(&p.xy())).collect();
-        [quantile(&mut values, 0.01), quantile(&mut values, 0.99)]
+        // From well inside on to the very ends, which stray points have moved.
+        let [a, b, c, d] = [0.01, 0.02, 0.98, 0.99].map(|share| quantile(&mut values, share));
+        [a - (b - a), d + (d - c)]
     };
     let direction = |k: usize| {
         let (sin, cos) = (std::f64::consts::FRAC_PI_2 * k as f64 / DIRECTIONS as f64).sin_cos();
@@ -39,8 +46,18 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
     };
     let best = (0..DIRECTIONS).map(|k| (area(k), k)).min_by(|a, b| a.0.total_cmp(&b.0))?.1;
     let axes = direction(best);
-    // Along x the noses overhang, or there is a gap between two hooks; along y neither.
-    let score = axes.map(|d| {
+    // Along x the noses slope; along y all faces are upright or level.
+    let mut slopes = [0.0_f64; 2];
+    for (i, _) in segment.iter().enumerate().filter(|(_, s)| **s) {
+        let normal = frame.axes.tr_mul(&wide(sample.normal_in_camera(i)));
+        if SLOPING.contains(&normal.z) {
+            for (slope, d) in slopes.iter_mut().zip(axes) {
+                *slope += d.dot(&normal.xy()).powi(4);
+            }
+        }
+    }
+    // They also overhang, or there is a gap between two hooks.
+    let shape = axes.map(|d| {
         let [a, b] = extents(d, 0.0, f64::MAX);
         let (wide, foot) = (extents(d, 0.5 * top, f64::MAX), extents(d, 0.0, 0.45 * top));
         let between = upper.iter().filter(|p| {
@@ -51,7 +68,8 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         let overhang = ((wide[1] - wide[0]) - (foot[1] - foot[0])) / (b - a).max(1e-9);
         overhang + 2.0 * (0.16 - share).max(0.0) / 0.16
     });
-    let (along, across) = if score[0] >= score[1] { (axes[0], axes[1]) } else { (axes[1], axes[0]) };
+    let lead = shape[0] - shape[1] + SLOPE_WEIGHT * ((slopes[0] + 1.0) / (slopes[1] + 1.0)).ln();
+    let (along, across) = if lead >= 0.0 { (axes[0], axes[1]) } else { (axes[1], axes[0]) };
     let (x, y) = (extents(along, 0.0, f64::MAX), extents(across, 0.0, f64::MAX));
     let centre = along * (0.5 * (x[0] + x[1])) + across * (0.5 * (y[0] + y[1]));
     let dimensions = FeatureDimensions {

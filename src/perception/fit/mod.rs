@@ -37,7 +37,8 @@ pub struct Fit {
     pub camera_from_feature: Isometry3<f64>,
     /// Dimensions; zero where they do not apply or could not be told.
     pub dimensions: FeatureDimensions,
-    /// Of a hole or axis: the share of its wall's variance that a helix explains, 0 to 1.
+    /// Of a hole or axis: how much more of its wall's variance a helix of one hand explains than any of
+    /// the other, 0 to 1.
     pub winding: Option<f64>,
 }
 
@@ -95,7 +96,7 @@ pub fn fit(cloud: &[[f32; 3]], sample: &Sample, segment: &[bool], class: Feature
     }
     let fit = match class {
         FeatureClass::Slot => slot::fit(&surface?, &dense),
-        FeatureClass::Buckle => hook::fit(&surface?, &dense),
+        FeatureClass::Buckle => hook::fit(&surface?, &dense, sample, segment),
         _ => round::fit(surface.as_ref(), cloud, sample, segment, &dense, class, &mut rng),
     };
     fit.filter(|fit| near(fit, &dense.feature))

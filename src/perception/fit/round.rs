@@ -11,8 +11,21 @@ use crate::perception::sample::Sample;
 
 const CIRCLES: usize = 160;
 const AXES: usize = 80;
+/// Flat patches whose direction is tried as an axis.
+const PATCHES: usize = 2;
+/// Cosine between normals of one patch.
+const FLAT: f64 = 0.97;
+/// Cosine between axis and normal from which a point is of cap or floor.
+const FACING: f64 = 0.88;
+/// Cosine between the wall's normal and a point's for it to be of the wall, and distance in reaches.
+const ALIKE: f64 = 0.8;
+const NEAR: f64 = 0.06;
+/// Share of the agreement of a free axis at which the surface's normal is believed.
+const SURFACE: f64 = 0.85;
 /// Points that vote on a circle.
 const VOTERS: usize = 240;
+/// Largest radius of a circle in the extent of its points: about half a turn of a wall is seen.
+const WIDEST: f64 = 0.75;
 /// Tolerance of a circle's votes, in its radius.
 const TOLERANCE: f64 = 0.05;
 /// Spread allowed between axis and surface normal where there is a surface, and where not.
@@ -49,76 +62,110 @@ pub(crate) fn fit(
     rng: &mut ChaCha8Rng,
 ) -> Option<Fit> {
     let middle = dense.feature.iter().sum::<Vector3<f64>>() / dense.feature.len() as f64;
-    let by_surface = surface.and_then(|plane| {
-        let origin = middle - plane.normal * plane.height(middle);
-        let frame = Frame::on(origin, plane.normal);
-        Some((frame, wall(&frame, dense, class, LEAN[0], rng)?))
-    });
-    // What stands out may stand on no surface that is seen: a plug at the end of a cable.
-    let raised = !matches!(class, FeatureClass::ThreadedHole | FeatureClass::SmoothHole);
-    let by_normals = raised.then(|| axis_of_normals(sample, segment, rng)).flatten().and_then(|axis| {
-        let frame = Frame::on(middle, axis);
-        Some((frame, wall(&frame, dense, class, LEAN[1], rng)?))
-    });
-    let agreement = |f: &Frame, w: &Wall| agreement(f, w, cloud, sample, segment);
-    let (frame, wall, on_surface) = match (by_surface, by_normals) {
-        (Some((f, w)), Some((free, v))) if agreement(&f, &w) >= 0.85 * agreement(&free, &v) => (f, w, true),
-        (_, Some((f, w))) => (f, w, false),
-        (Some((f, w)), None) => (f, w, true),
-        (None, None) => return None,
+    let mut distances: Vec<f64> = dense.feature.iter().map(|p| (p - middle).norm()).collect();
+    let shown = Shown {
+        points: segment
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| **s)
+            .map(|(i, _)| (wide(cloud[usize::from(sample.source[i])]), wide(sample.smooth_normal_in_camera(i))))
+            .collect(),
+        reach: quantile(&mut distances, 0.95),
     };
+    let mut best: Option<(f64, Frame, Wall, bool)> = None;
+    let mut consider = |frame: Frame, lean: f64, on_surface: bool, rng: &mut ChaCha8Rng| {
+        if let Some(wall) = wall(&frame, dense, class, lean, rng) {
+            let score = shown.agreement(&frame, &wall) / if on_surface { SURFACE } else { 1.0 };
+            if best.as_ref().is_none_or(|b| score > b.0) {
+                best = Some((score, frame, wall, on_surface));
+            }
+        }
+    };
+    if let Some(plane) = surface {
+        let origin = middle - plane.normal * plane.height(middle);
+        consider(Frame::on(origin, plane.normal), LEAN[0], true, rng);
+    }
+    // What stands out may stand on no surface that is seen: a plug at the end of a cable.
+    if !matches!(class, FeatureClass::ThreadedHole | FeatureClass::SmoothHole) {
+        for axis in shown.axes(rng) {
+            consider(Frame::on(middle, axis), LEAN[1], false, rng);
+        }
+    }
+    let (_, frame, wall, on_surface) = best?;
     Some(finish(&frame, &wall, on_surface, dense, class, sample))
 }
 
-/// Share of the feature's sampled points near the wall whose normals are the wall's.
-fn agreement(frame: &Frame, wall: &Wall, cloud: &[[f32; 3]], sample: &Sample, segment: &[bool]) -> f64 {
-    let (mut alike, mut count) = (0.0, 0.0);
-    for (i, _) in segment.iter().enumerate().filter(|(_, s)| **s) {
-        count += 1.0;
-        let p = frame.local(wide(cloud[usize::from(sample.source[i])]));
-        let (off, e) = wall.distance(&p);
-        if e.abs() > 0.15 * wall.radius.abs() {
-            continue;
-        }
-        let out = off / off.norm().max(1e-9);
-        let lean = -wall.slope - wall.lean.dot(&out);
-        let normal = frame.axes.tr_mul(&wide(sample.normal_in_camera(i)));
-        // Of a bore the wall is seen from within.
-        let cosine = Vector3::new(out.x, out.y, lean).normalize().dot(&normal).abs();
-        alike += f64::from(u8::from(cosine > 0.8));
-    }
-    alike / f64::max(count, 1.0)
+/// The feature's sampled points with their smooth normals, in the camera frame.
+struct Shown {
+    points: Vec<(Vector3<f64>, Vector3<f64>)>,
+    /// Distance from their middle that nearly all keep.
+    reach: f64,
 }
 
-/// The axis that most normals of the feature keep a common angle to.
-fn axis_of_normals(sample: &Sample, segment: &[bool], rng: &mut ChaCha8Rng) -> Option<Vector3<f64>> {
-    let feature = segment.iter().enumerate().filter(|(_, s)| **s);
-    let normals: Vec<Vector3<f64>> = feature.map(|(i, _)| wide(sample.normal_in_camera(i))).collect();
-    if normals.len() < 12 {
-        return None;
+impl Shown {
+    /// Share of the points that lie on the wall with its normal, or face along the axis within it as a cap
+    /// or floor does.
+    fn agreement(&self, frame: &Frame, wall: &Wall) -> f64 {
+        let axis = Vector3::new(wall.lean.x, wall.lean.y, 1.0).normalize();
+        let on = |(p, n): &&(Vector3<f64>, Vector3<f64>)| {
+            let (off, e) = wall.distance(&frame.local(*p));
+            let normal = frame.axes.tr_mul(n);
+            if axis.dot(&normal) > FACING {
+                return e < NEAR * self.reach;
+            }
+            let out = off / off.norm().max(1e-9);
+            let lean = -wall.slope - wall.lean.dot(&out);
+            // Of a bore the wall is seen from within.
+            let cosine = Vector3::new(out.x, out.y, lean).normalize().dot(&normal).abs();
+            e.abs() < NEAR * self.reach && cosine > ALIKE
+        };
+        self.points.iter().filter(on).count() as f64 / self.points.len().max(1) as f64
     }
-    let mut best: (usize, Vector3<f64>) = (0, Vector3::zeros());
-    for _ in 0..AXES {
-        let [a, b, c] = [0; 3].map(|_| normals[rng.random_range(0..normals.len())]);
-        let axis = (a - b).cross(&(a - c));
-        let length = axis.norm();
-        if length < 0.05 {
-            continue;
+
+    /// Axes worth trying, out of the part: the one most normals keep a common angle to, and those that
+    /// flat patches, such as the end of a pin, look along.
+    fn axes(&self, rng: &mut ChaCha8Rng) -> Vec<Vector3<f64>> {
+        let normals: Vec<Vector3<f64>> = self.points.iter().map(|(_, n)| *n).collect();
+        if normals.len() < 12 {
+            return Vec::new();
         }
-        let axis = axis / length;
-        let level = axis.dot(&a);
-        // Flanks only: caps look along the axis.
-        if level.abs() > 0.75 {
-            continue;
+        let mut round: (usize, Vector3<f64>) = (0, Vector3::zeros());
+        for _ in 0..AXES {
+            let [a, b, c] = [0; 3].map(|_| normals[rng.random_range(0..normals.len())]);
+            let axis = (a - b).cross(&(a - c));
+            let length = axis.norm();
+            if length < 0.05 {
+                continue;
+            }
+            let axis = axis / length;
+            let level = axis.dot(&a);
+            // Flanks only: caps look along the axis.
+            if level.abs() > 0.75 {
+                continue;
+            }
+            let votes = normals.iter().filter(|n| (axis.dot(n) - level).abs() < 0.08).count();
+            if votes > round.0 {
+                round = (votes, axis);
+            }
         }
-        let votes = normals.iter().filter(|n| (axis.dot(n) - level).abs() < 0.08).count();
-        if votes > best.0 {
-            best = (votes, axis);
+        let mut axes = Vec::with_capacity(1 + PATCHES);
+        if round.0 * 4 >= normals.len() {
+            axes.push(round.1);
         }
+        let mut left = normals.clone();
+        for _ in 0..PATCHES {
+            let alike = |n: &Vector3<f64>| left.iter().filter(|m| n.dot(m) > FLAT).count();
+            let Some(patch) = left.iter().copied().max_by_key(alike) else { break };
+            let (on, off): (Vec<_>, Vec<_>) = left.iter().partition(|m| patch.dot(m) > FLAT);
+            if on.len() * 10 < normals.len() {
+                break;
+            }
+            axes.push(on.iter().sum::<Vector3<f64>>().normalize());
+            left = off;
+        }
+        // Out of the part: towards the camera.
+        axes.iter().map(|axis| if axis.z > 0.0 { -*axis } else { *axis }).collect()
     }
-    let axis = best.1;
-    // Out of the part: towards the camera.
-    (best.0 * 3 >= normals.len()).then_some(if axis.z > 0.0 { -axis } else { axis })
 }
 
 /// The wall among the feature's points, given a frame with z near its axis.
@@ -156,7 +203,7 @@ fn guess(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<Wall> {
         let Some((centre, radius)) = through(a.xy(), b.xy(), c.xy()) else {
             continue;
         };
-        if radius > 1.2 * widest || radius < 0.05 * widest {
+        if radius > WIDEST * widest || radius < 0.05 * widest {
             continue;
         }
         let mut wall = Wall { centre, lean: Vector2::zeros(), radius, slope: 0.0, sigma: [0.0; 2] };
@@ -232,7 +279,10 @@ fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall
             right[k] -= stiffness * now;
         }
         let inverse = normal.try_inverse()?;
-        let step = inverse * right;
+        let mut step = inverse * right;
+        // A short arc says little about its radius: not farther than halfway at once.
+        let most = 0.5 * wall.radius.abs() / step[4].abs().max(1e-12);
+        step *= most.min(1.0);
         wall.centre += Vector2::new(step[0], step[1]);
         wall.lean += Vector2::new(step[2], step[3]);
         wall.radius += step[4];
@@ -251,28 +301,34 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
     let local: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
     let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
     let sunk = quantile(&mut heights, 0.5) < 0.0 && on_surface;
-    let base = if on_surface { 0.0 } else { quantile(&mut heights, 0.02) };
-    let end = if sunk { quantile(&mut heights, 0.04) } else { quantile(&mut heights, 0.96) };
+    let base = if on_surface { 0.0 } else { quantile(&mut heights, 0.01) };
+    // The end of a sharp cone shows few points.
+    let last = if class == FeatureClass::Cone { 0.01 } else { 0.04 };
+    let end = quantile(&mut heights, if sunk { last } else { 1.0 - last });
     let end = level(&heights, end, 0.04 * (end - base).abs());
     let spacing = 2.0 * f64::from(sample.scale) / 100.0;
     let depth = measured((end - base).abs(), 0.3 * spacing + 0.01 * (end - base).abs());
 
-    let wound: Vec<[f64; 3]> = local
+    // Neither floor nor chamfer.
+    let (from, to) = (base.min(end), base.max(end));
+    let inside = from + 0.06 * (to - from)..to - 0.06 * (to - from);
+    let flank: Vec<[f64; 3]> = local
         .iter()
+        .filter(|p| inside.contains(&p.z))
         .filter_map(|p| {
             let (off, e) = wall.distance(p);
             (e.abs() < 0.2 * wall.radius).then(|| [p.z, off.y.atan2(off.x), e])
         })
         .collect();
-    let winding = if class == FeatureClass::Cone { None } else { thread::pitch(&wound, wall.radius) };
+    let wound = if class == FeatureClass::Cone { None } else { thread::wound(&flank, wall.radius) };
     let (diameter, pitch) = match class {
         FeatureClass::ThreadedHole | FeatureClass::ThreadedAxis => {
-            let pitch = winding.map(|(pitch, _)| pitch).unwrap_or_default();
+            let pitch = wound.unwrap_or_default().pitch;
             // Crests hide much of the roots, so that the wall fitted lies nearer to them: in a
             // bore the major diameter is most of twice the profile's height outside, on an axis
             // a little of it. Shares measured on generated threads.
             let hole = class == FeatureClass::ThreadedHole;
-            let (height, share) = if hole { (0.5413, 1.7) } else { (0.6134, 0.38) };
+            let (height, share) = if hole { (0.5413, 1.58) } else { (0.6134, 0.12) };
             let steepness = if pitch.value > 0.0 { pitch.value } else { 0.27 * wall.radius };
             let height = height * share * steepness;
             (measured(2.0 * wall.radius + height, 2.0 * wall.sigma[1] + 0.3 * height), pitch)
@@ -287,7 +343,7 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
     Fit {
         camera_from_feature: frame.pose(at, axis, Vector3::x()),
         dimensions: FeatureDimensions { diameter, depth, pitch, ..FeatureDimensions::default() },
-        winding: winding.map(|(_, share)| share),
+        winding: wound.map(|wound| wound.winding),
     }
 }
 

@@ -1,10 +1,17 @@
 //! Slots: the outline of the opening, seen along the surface's normal.
 
 use nalgebra::{Matrix2, SymmetricEigen, Vector2, Vector3};
-use tandem_msg::FeatureDimensions;
+use tandem_msg::{FeatureDimensions, Measured};
 
 use super::plane::Plane;
 use super::{Dense, Fit, Frame, Local, measured, quantile};
+
+/// Points beside an edge that are counted, and those whose spacing says how dense they lie. Noise carries some
+/// over the edge but changes no count.
+const COUNTED: usize = 12;
+const SPACED: usize = 48;
+/// Points an edge is told from at least.
+const EDGE_MIN: usize = 8;
 
 /// Fits a slot: direction, centre, length, width, depth.
 ///
@@ -16,7 +23,8 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
     let frame = Frame::on(middle - plane.normal * plane.height(middle), plane.normal);
     let inside: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
     let band = (4.0 * plane.rms).max(40e-6);
-    let on: Vec<Local> = dense.rest.iter().map(|p| frame.local(*p)).filter(|p| p.z.abs() < band).collect();
+    let all = dense.rest.iter().chain(&dense.feature);
+    let on: Vec<Local> = all.map(|p| frame.local(*p)).filter(|p| p.z.abs() < band).collect();
 
     let mut along = longest(&inside);
     let mut centre = Vector2::zeros();
@@ -52,8 +60,15 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         }
         // Both ends, near the middle line.
         let y_mid = 0.5 * (edge_y[0] + edge_y[1]);
-        let strip = 0.25 * (edge_y[1] - edge_y[0]).max(2.0 * spacing);
-        let ends = gap(plate.iter().filter(|p| (p.y - y_mid).abs() < strip).map(|p| p.x), mid.x, x1 - x0);
+        let round = 0.5 * (edge_y[1] - edge_y[0]).max(2.0 * spacing);
+        // Where a rounded end would lie on the middle line if it passed through the point; of a square end the
+        // points on the line itself come first.
+        let end = |p: &Vector2<f64>| {
+            let off = (p.y - y_mid).abs();
+            let back = round - (round * round - off * off).max(0.0).sqrt();
+            (off < 0.6 * round).then_some(p.x + back * (p.x - mid.x).signum())
+        };
+        let ends = gap(plate.iter().filter_map(end), mid.x, x1 - x0);
         length_seen = ends.is_some();
         let edge_x = ends.unwrap_or([x0, x1]);
         length = edge_x[1] - edge_x[0];
@@ -78,7 +93,8 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense) -> Option<Fit> {
         (length, width) = (length - 2.0 * chamfer, width - 2.0 * chamfer);
     }
     let dimensions = FeatureDimensions {
-        length: if length_seen { measured(length, 0.5 * spacing) } else { measured(length, 0.3 * length) },
+        // How long a slot is that leaves the view nobody can tell.
+        length: if length_seen { measured(length, 0.5 * spacing) } else { Measured::default() },
         width: measured(width, 0.3 * spacing),
         depth: measured(depth, plane.rms + 0.02 * depth),
         ..FeatureDimensions::default()
@@ -100,8 +116,8 @@ pub(crate) fn longest(points: &[Local]) -> Vector2<f64> {
     if along.x < 0.0 { -along } else { along }
 }
 
-/// The empty interval around `middle`: the last coordinate below and the first above it that
-/// are not stray. `None` when one side shows nothing within three times `extent`.
+/// The empty interval around `middle`: where an even density of points, counted back from well outside,
+/// would have come to its end on either side. `None` when one side shows nothing within three times `extent`.
 fn gap(values: impl Iterator<Item = f64>, middle: f64, extent: f64) -> Option<[f64; 2]> {
     let (mut below, mut above) = (Vec::new(), Vec::new());
     for v in values {
@@ -111,12 +127,17 @@ fn gap(values: impl Iterator<Item = f64>, middle: f64, extent: f64) -> Option<[f
             above.push(v);
         }
     }
-    if below.len() < 4 || above.len() < 4 {
+    if below.len() < EDGE_MIN || above.len() < EDGE_MIN {
         return None;
     }
     below.sort_unstable_by(|a, b| b.total_cmp(a));
     above.sort_unstable_by(f64::total_cmp);
-    // The very first may be a stray point.
-    let edges = [below[1], above[1]];
-    (middle - edges[0] < 3.0 * extent && edges[1] - middle < 3.0 * extent).then_some(edges)
+    let edge = |v: &[f64]| {
+        let far = SPACED.min(v.len() - 1);
+        let near = COUNTED.min(far / 3);
+        v[near] - (v[far] - v[near]) * (near as f64 + 0.5) / (far - near) as f64
+    };
+    let edges = [edge(&below), edge(&above)];
+    let near = middle - edges[0] < 3.0 * extent && edges[1] - middle < 3.0 * extent;
+    (near && edges[0] < edges[1]).then_some(edges)
 }
