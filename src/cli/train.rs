@@ -24,10 +24,10 @@ enum What {
 #[derive(Args)]
 struct EncoderArgs {
     /// Training examples; a tenth as many more for validation, an eighth for the test
-    #[arg(long, default_value_t = 16_000)]
+    #[arg(long, default_value_t = 8_000)]
     samples: usize,
     /// Passes over the examples
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 16)]
     epochs: usize,
     /// Decides everything that is drawn
     #[arg(long, default_value_t = 1)]

@@ -91,9 +91,10 @@ impl Sight {
         std::array::from_fn(|c| 0.5 * (first[c] + self.near_answer.logits[c]))
     }
 
-    /// Pose and dimensions of a feature of this class, fitted to what was seen of it from nearest.
+    /// Pose and dimensions of a feature of this class, fitted to what was seen of it from nearest; of a
+    /// slot to the whole view, since the surface has to be seen beyond both its ends.
     pub fn fit(&self, cloud: &[[f32; 3]], class: FeatureClass) -> Option<Fit> {
-        if self.closer {
+        if self.closer && class != FeatureClass::Slot {
             fit(&self.cut.points, &self.near_sample, &self.near_answer.segment, class)
         } else {
             fit(cloud, &self.sample, &self.answer.segment, class)

@@ -119,7 +119,7 @@ fn place(
     on_body: &[bool],
     rng: &mut ChaCha8Rng,
 ) -> Option<Ball> {
-    let mut jitter = |rng: &mut ChaCha8Rng| {
+    let jitter = |rng: &mut ChaCha8Rng| {
         let unit: f32 = StandardNormal.sample(rng);
         MISPLACED * unit
     };

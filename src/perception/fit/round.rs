@@ -301,7 +301,10 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
     let local: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
     let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
     let sunk = quantile(&mut heights, 0.5) < 0.0 && on_surface;
-    let base = if on_surface { 0.0 } else { quantile(&mut heights, 0.01) };
+    // Of what it stands on, a cable say, some may have been taken for it: that is not on the wall.
+    let mut on_wall: Vec<f64> =
+        local.iter().filter(|p| wall.distance(p).1.abs() < 0.1 * wall.radius.abs()).map(|p| p.z).collect();
+    let base = if on_surface { 0.0 } else { quantile(&mut on_wall, 0.01) };
     // The end of a sharp cone shows few points.
     let last = if class == FeatureClass::Cone { 0.01 } else { 0.04 };
     let end = quantile(&mut heights, if sunk { last } else { 1.0 - last });

@@ -65,7 +65,6 @@ struct Block {
     bias: Range<usize>,
     mean: Range<usize>,
     variance: Range<usize>,
-    input: usize,
     output: usize,
 }
 
@@ -99,13 +98,12 @@ pub(crate) struct Plan {
 impl Plan {
     pub(crate) fn new(parameters: &Spans, statistics: &Spans) -> Self {
         let of = |name: &str| parameters.of(name);
-        let block = |name: &str, input, output| Block {
+        let block = |name: &str, output| Block {
             weight: of(&format!("{name}.weight")),
             gain: of(&format!("{name}.gain")),
             bias: of(&format!("{name}.bias")),
             mean: statistics.of(&format!("{name}.mean")),
             variance: statistics.of(&format!("{name}.variance")),
-            input,
             output,
         };
         let attention = |i: usize| {
@@ -114,20 +112,20 @@ impl Plan {
                 key: of(&format!("{name}.key")),
                 value: of(&format!("{name}.value")),
                 place: of(&format!("{name}.place")),
-                offset: block(&format!("{name}.offset"), WIDTH, WIDTH),
+                offset: block(&format!("{name}.offset"), WIDTH),
             }
         };
         Self {
-            embed: [block("encoder.embed.0", MEMBER, EMBED), block("encoder.embed.1", EMBED, WIDTH)],
+            embed: [block("encoder.embed.0", EMBED), block("encoder.embed.1", WIDTH)],
             attention: (0..LAYERS).map(attention).collect(),
-            fuse: block("encoder.fuse", WIDTH * (LAYERS + 1), FUSED),
-            class_hidden: block("class.hidden", 2 * FUSED, CLASS_HIDDEN),
+            fuse: block("encoder.fuse", FUSED),
+            class_hidden: block("class.hidden", CLASS_HIDDEN),
             class_out: of("class.out.weight"),
             class_bias: of("class.out.bias"),
             segment_token: of("segment.token"),
             segment_cloud: of("segment.cloud"),
-            segment_point: block("segment.point", MEMBER, SEGMENT_HIDDEN[0]),
-            segment_hidden: block("segment.hidden", SEGMENT_HIDDEN[0], SEGMENT_HIDDEN[1]),
+            segment_point: block("segment.point", SEGMENT_HIDDEN[0]),
+            segment_hidden: block("segment.hidden", SEGMENT_HIDDEN[1]),
             segment_out: of("segment.out.weight"),
             segment_bias: of("segment.out.bias"),
             parameters: parameters.len(),
