@@ -5,7 +5,7 @@ use tandem::evaluation::safety::{Arm, Behind, campaign, crossing, passers_by, wi
 use crate::rig::shipped;
 
 fn arm() -> Arm {
-    let cell = shipped();
+    let cell = shipped("s471");
     Arm { chain: cell.robot.chain, body: cell.robot.body, params: cell.controller }
 }
 

@@ -113,7 +113,7 @@ impl Tracking {
             self.told.header.seq += 1;
             return &self.told;
         };
-        if self.cycle % FRAME == 0 {
+        if self.cycle.is_multiple_of(FRAME) {
             self.wander();
         }
         let mut fresh = self.told;
@@ -144,7 +144,7 @@ impl Tracking {
                 self.told.header.stamp = now;
                 self.told.header.seq = seq + 1;
             }
-            Fault::Lost(every) if cycle % every == 0 => {}
+            Fault::Lost(every) if cycle.is_multiple_of(every) => {}
             _ if newer => {
                 self.told = fresh;
                 self.told.header.seq = seq + 1;

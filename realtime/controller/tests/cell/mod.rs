@@ -271,7 +271,7 @@ impl Cell {
         if self.human_alive {
             for capsule in self.human.capsules.iter_mut().take(self.human.capsule_count as usize) {
                 // A tracker is never still.
-                let shiver = if self.cycle % 2 == 0 { 1e-9 } else { -1e-9 };
+                let shiver = if self.cycle.is_multiple_of(2) { 1e-9 } else { -1e-9 };
                 for end in &mut capsule.ends {
                     end[2] += shiver;
                     for (x, v) in end.iter_mut().zip(&capsule.velocity) {

@@ -18,9 +18,7 @@ use std::ops::Range;
 
 use super::dataset::Look;
 use crate::perception::kernel::Panels;
-use crate::perception::network::{
-    CLASS_HIDDEN, EMBED, FUSED, KEY_WIDTH, LAYERS, MEMBER, SEGMENT_HIDDEN, WIDTH, member,
-};
+use crate::perception::network::{CLASS_HIDDEN, EMBED, FUSED, KEY_WIDTH, LAYERS, SEGMENT_HIDDEN, WIDTH, member};
 use crate::perception::sample::{CENTRES, HOMES};
 use norm::Normalised;
 
