@@ -4,6 +4,8 @@
 //! bitmaps: what shows the file has both.
 
 use std::fmt::Write;
+use std::io;
+use std::path::Path;
 
 /// Width of a figure and of its margins, and height of a panel and of the gaps, in pixels.
 const WIDTH: f64 = 900.0;
@@ -59,6 +61,17 @@ pub struct Band {
 }
 
 impl Figure {
+    /// Writes [`Self::svg`] into a file, and makes its folder.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn save(&self, file: &Path) -> io::Result<()> {
+        if let Some(folder) = file.parent() {
+            std::fs::create_dir_all(folder)?;
+        }
+        std::fs::write(file, self.svg())
+    }
+
     /// The figure as an SVG document.
     pub fn svg(&self) -> String {
         let height = TOP + self.panels.len() as f64 * (PANEL + GAP) - GAP + BOTTOM;

@@ -114,10 +114,10 @@ fn an_srdf_allows_collisions() {
         let srdf = srdf.map(|text| (PathBuf::from("arm.srdf"), text.to_owned()));
         Robot::parse(&file, ARM, &RobotOptions { srdf, ..options.clone() }).map(|robot| robot.body.self_pairs().count())
     };
-    // Base against what moves with the head: its mesh and both fingers.
-    assert_eq!(pairs(None).expect("it loads"), 3);
+    // The two capsules of the base against what moves with the head: its mesh and both fingers.
+    assert_eq!(pairs(None).expect("it loads"), 6);
     let some = r#"<robot name="arm"><disable_collisions link1="base" link2="head" reason="Never"/></robot>"#;
-    assert_eq!(pairs(Some(some)).expect("it loads"), 3, "the fingers may still meet the base");
+    assert_eq!(pairs(Some(some)).expect("it loads"), 6, "the fingers may still meet the base");
     let all = r#"<robot name="arm"><disable_collisions link1="base" link2="head"/>
         <disable_collisions link1="left" link2="base"/><disable_collisions link1="right" link2="base"/></robot>"#;
     assert_eq!(pairs(Some(all)).expect("it loads"), 0);
@@ -134,7 +134,7 @@ fn an_impossible_inertia_is_put_right() {
     let (_folder, file, options) = package();
     let text = ARM.replacen("izz=\"0.001\"", "izz=\"0.2\"", 1);
     let robot = Robot::parse(&file, &text, &options).unwrap_or_else(|faults| panic!("{faults:?}"));
-    let note = "link \"head\": its inertia has a gyration radius of 0.45 m, past its farthest point at 0.05 m; \
+    let note = "link \"head\": its inertia has a gyration radius of 0.45 m, past its farthest point at 0.08 m; \
                 taken as that of its collision shape";
     assert_eq!(robot.notes, [note]);
     assert!(robot.links[2].inertia[2][2] < 0.0025, "{:?}", robot.links[2]);

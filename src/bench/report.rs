@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::conditions::{Conditions, Ticks};
 use super::{Bench, QUANTILES, Series};
+use crate::plot::{Figure, Line, Panel};
 
 /// One figure beside its baseline.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -49,6 +50,34 @@ impl Report {
             rows: Vec::new(),
             notes: Vec::new(),
             ticks: Ticks::now(),
+        }
+    }
+
+    /// The distribution of every case: how many microseconds are not exceeded by all but one in ten, hundred, thousand.
+    pub fn distributions(&self) -> Figure {
+        /// Steps of the common axis, and how many make a factor of ten.
+        const STEPS: u32 = 40;
+        const STEPS_A_DECADE: f64 = 10.0;
+        let line = |series: &Series| {
+            let whole = series.whole();
+            let decades = (0..=STEPS).map(|step| f64::from(step) / STEPS_A_DECADE);
+            // Past the last sample there is nothing to show.
+            let shown = decades.take_while(|decades| 10_f64.powf(*decades) <= whole.len() as f64);
+            let point = |decades: f64| {
+                let value = whole.value_at_quantile(1.0 - 10_f64.powf(-decades)).max(1);
+                [decades, (value as f64 * 1e-3).log10()]
+            };
+            Line { name: series.case.clone(), points: shown.map(point).collect() }
+        };
+        Figure {
+            title: format!("tandem bench {}", self.bench.name()),
+            x_label: "all but one in ten to the power of".to_owned(),
+            panels: vec![Panel {
+                y_label: "log10 of microseconds".to_owned(),
+                y_max: None,
+                lines: self.series.iter().filter(|series| !series.is_empty()).map(line).collect(),
+            }],
+            bands: Vec::new(),
         }
     }
 

@@ -49,7 +49,7 @@ struct Wanted {
     #[arg(long, value_name = "FOLDER")]
     save: Option<PathBuf>,
     /// Draw the distributions into this file
-    #[arg(long, value_name = "FILE.svg|FILE.png")]
+    #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
     /// Print one JSON object a line
     #[arg(long)]
@@ -105,6 +105,12 @@ fn keep(report: &Report, wanted: &Wanted) -> u8 {
                 Err(error) => return refused(folder, &error),
             }
         }
+    }
+    if let Some(file) = &wanted.plot {
+        if let Err(error) = report.distributions().save(file) {
+            return refused(file, &error);
+        }
+        anstream::eprintln!("drawn {}", file.display());
     }
     exit::OK
 }

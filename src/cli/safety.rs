@@ -1,6 +1,6 @@
 //! `tandem eval safety`: measures what the controller does about people against what is demanded of it.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Args;
@@ -164,7 +164,7 @@ fn walk_in_row(cell: &Cell, args: &SafetyArgs) -> Result<Row, String> {
     const RUNS: u64 = 10;
     for seed in (args.seed..).take(RUNS as usize) {
         let Some(found) = safety::walk_in(cell, seed).map_err(|error| error.to_string())? else { continue };
-        write(&args.plot, &found.figure().svg())?;
+        found.figure().save(&args.plot).map_err(|error| format!("{}: {error}", args.plot.display()))?;
         let [stood, resumed] = found.stood;
         let [before, after] = found.speeds;
         return Ok(Row {
@@ -181,14 +181,6 @@ fn walk_in_row(cell: &Cell, args: &SafetyArgs) -> Result<Row, String> {
         });
     }
     Err(format!("in {RUNS} runs of the cell nobody walked in on a moving arm"))
-}
-
-fn write(file: &Path, text: &str) -> Result<(), String> {
-    let refused = |error: std::io::Error| format!("{}: {error}", file.display());
-    if let Some(folder) = file.parent() {
-        std::fs::create_dir_all(folder).map_err(refused)?;
-    }
-    std::fs::write(file, text).map_err(refused)
 }
 
 fn report(args: &SafetyArgs, tally: &Tally, rows: &[Row], wall_time_s: f64) {

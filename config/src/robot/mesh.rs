@@ -154,7 +154,7 @@ fn volume((ends, radius): &Capsule) -> f64 {
 /// The capsule around `all` along an axis, centred on some of the points: as thin as their shadow, then
 /// as short as that lets it be.
 fn along(points: &[Vector3<f64>], all: &[Vector3<f64>], axis: &Vector3<f64>) -> Capsule {
-    /// Room for the rounding of the sums below.
+    /// Room for the rounding of the sums below, added when the ends are found.
     const ROUNDING: f64 = 1e-9;
     let shadow = |p: &Vector3<f64>| p - axis * axis.dot(p);
     let farthest = |of: &[Vector3<f64>], from: &Vector3<f64>| {
@@ -167,7 +167,7 @@ fn along(points: &[Vector3<f64>], all: &[Vector3<f64>], axis: &Vector3<f64>) -> 
     for step in 1..200 {
         centre += (farthest(points, &centre) - centre) / f64::from(step + 1);
     }
-    let radius = (farthest(all, &centre) - centre).norm() + ROUNDING;
+    let radius = (farthest(all, &centre) - centre).norm();
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for p in all {
         let room = (radius * radius - (shadow(p) - centre).norm_squared()).max(0.0).sqrt();
@@ -178,7 +178,7 @@ fn along(points: &[Vector3<f64>], all: &[Vector3<f64>], axis: &Vector3<f64>) -> 
         low = 0.5 * (low + high);
         high = low;
     }
-    ([centre + axis * low, centre + axis * high], radius)
+    ([centre + axis * low, centre + axis * high], radius + ROUNDING)
 }
 
 #[cfg(test)]
