@@ -14,9 +14,11 @@ use crate::supervisor::RunOptions;
 
 /// Shown before the arm begins to wait, and after it goes on, s.
 const BEFORE: f64 = 3.0;
-const AFTER: f64 = 2.5;
+const AFTER: f64 = 1.5;
 /// An arm this fast is on its way, m/s.
 const UNDER_WAY: f64 = 0.25;
+/// An arm this slow stands: what is measured of one at rest stays below, m/s.
+const STANDS: f64 = 0.01;
 /// It was on its way this long before it waited, at most, s.
 const SHORTLY: f64 = 1.0;
 
@@ -116,13 +118,13 @@ fn complete(samples: &[Sample]) -> Option<WalkIn> {
     let since = samples.partition_point(|sample| sample.time < last.time - 30.0);
     let recent = &samples[since..];
     // Backwards: on the way again for AFTER, before that standing next to somebody, before that on the way.
-    let again = recent.iter().rposition(|sample| sample.tcp_speed < 1e-3)?;
+    let again = recent.iter().rposition(|sample| sample.tcp_speed < STANDS)?;
     let resumed = recent[again].time;
     let after = recent[again..].iter().fold(0.0_f64, |fastest, sample| fastest.max(sample.tcp_speed));
     if last.time - resumed < AFTER || after < UNDER_WAY {
         return None;
     }
-    let standing = recent[..=again].iter().rposition(|sample| sample.tcp_speed >= 1e-3)? + 1;
+    let standing = recent[..=again].iter().rposition(|sample| sample.tcp_speed >= STANDS)? + 1;
     let stood = recent[standing].time;
     let waited = recent[standing..=again].iter().any(|sample| sample.separation < sample.required + 0.1);
     let shortly = recent[..standing].iter().filter(|sample| sample.time > stood - SHORTLY);
@@ -131,7 +133,7 @@ fn complete(samples: &[Sample]) -> Option<WalkIn> {
         return None;
     }
     let from = recent.partition_point(|sample| sample.time < stood - BEFORE);
-    let moving = recent[from..].iter().filter(|sample| sample.tcp_speed >= 1e-3);
+    let moving = recent[from..].iter().filter(|sample| sample.tcp_speed >= STANDS);
     let distance = moving.fold(f64::INFINITY, |least, sample| least.min(sample.separation));
     Some(WalkIn { samples: recent[from..].to_vec(), stood: [stood, resumed], speeds: [before, after], distance })
 }
