@@ -8,7 +8,7 @@ use crate::perception::Perception;
 use crate::plant::Plant;
 use crate::product::{self, Product};
 use crate::read::{Bound, Reading, Table, bound};
-use crate::robot::{Robot, RobotOptions};
+use crate::robot::{Collision, Robot, RobotOptions};
 use crate::strategy::{self, ReferenceRow, StrategyRow};
 use crate::supervisor::Supervisor;
 use crate::timing::{Realtime, Timing};
@@ -146,6 +146,7 @@ fn read_robot(root: &Table<'_>, folder: &Path, reading: &Reading) -> Option<Robo
         jerk_max: list(&JERK),
         locked: table.texts("locked"),
         packages: package_folders(folder, &table.texts("packages")),
+        collision: read_collision(&table),
         srdf: read_srdf(&table, folder, reading),
     };
     let found = format!("\"{}\"", file.display());
@@ -173,6 +174,18 @@ fn read_robot(root: &Table<'_>, folder: &Path, reading: &Reading) -> Option<Robo
         }
     }
     Some(robot)
+}
+
+/// What stands for the collision geometry; capsules where the cell does not say.
+fn read_collision(table: &Table<'_>) -> Collision {
+    match table.text_if("collision").as_deref() {
+        Some("hulls") => Collision::Hulls,
+        Some("capsules") | None => Collision::Capsules,
+        Some(other) => {
+            table.refuse("collision", &format!("\"{other}\""), "capsules, hulls", "choose one of these names");
+            Collision::Capsules
+        }
+    }
 }
 
 /// The folders of the cell file, beside it, then those of ROS_PACKAGE_PATH.

@@ -38,7 +38,7 @@ pub use perception::Perception;
 pub use plant::Plant;
 pub use pose::{isometry_of, pose_of};
 pub use product::{Capture, Part, Product};
-pub use robot::{LinkInertia, Robot, RobotOptions};
+pub use robot::{Collision, LinkInertia, Robot, RobotOptions};
 pub use strategy::{AssemblyMode, Focus, Form, Range, ReferenceRow, Step, StrategyRow, Subject, Verb};
 pub use supervisor::{Capability, Supervisor, Timeouts};
 pub use timing::{Overrun, OverrunPolicy, Policy, Realtime, Schedule, Timing};

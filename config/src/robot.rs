@@ -2,14 +2,16 @@
 //!
 //! Any serial chain of up to eight moving joints is accepted: fixed joints are
 //! folded into the link they hang on, and with them those the cell holds still;
-//! collision shapes and meshes are covered by capsules, and the pairs of links that
+//! collision shapes and meshes are covered by capsules or hulls, and the pairs of links that
 //! must not meet are worked out here, less what an SRDF allows. Everything else is
 //! refused with its place in the file: meshes that are not there, joints that mimic
 //! or branch off, links without mass or shape, limits that are none.
 //!
 //! **Invariant:** a [`Robot`] never covers less than its file's collision geometry.
 
+mod capsule;
 mod contact;
+mod hull;
 mod inertia;
 mod lock;
 mod mesh;
@@ -20,14 +22,17 @@ mod tree;
 
 use crate::fault::{Fault, Faults};
 use nalgebra::{Isometry3, Unit, Vector3};
+use shape::Cover;
 use source::Source;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use tandem_clearance::{ArmBody, LINK_CAPSULES_MAX, LinkCapsule};
+use std::sync::Arc;
+use tandem_clearance::{ArmBody, LINK_CAPSULES_MAX, LinkCapsule, Monitor, ShapeError, Shapes};
 use tandem_kinematics::{Chain, JOINTS_MAX, Joint, JointKind};
 use tree::Tree;
 
 pub use inertia::LinkInertia;
+pub use shape::Collision;
 
 /// A joint without limits may turn this far either way, rad.
 const CONTINUOUS: f64 = 200.0 * std::f64::consts::PI;
@@ -51,6 +56,8 @@ pub struct RobotOptions {
     pub locked: Vec<String>,
     /// Folders in which `package://` is looked for.
     pub packages: Vec<PathBuf>,
+    /// What stands for the collision geometry.
+    pub collision: Collision,
     /// Name and text of an SRDF, whose `disable_collisions` are obeyed.
     pub srdf: Option<(PathBuf, String)>,
 }
@@ -67,8 +74,9 @@ pub struct Robot {
     pub urdf: urdf_rs::Robot,
     /// Moving joints and TCP.
     pub chain: Chain,
-    /// Capsules around the links and the pairs of links that must not meet.
+    /// Capsules around the links, the hulls in them, and the pairs of links that must not meet.
     pub body: ArmBody,
+    monitor: Monitor,
     /// Mass of each link of the chain, what is fixed to it included: `[0]` the base, `[i]` moved by joint i.
     pub links: Vec<LinkInertia>,
     /// Names of the moving joints, from the base outwards.
@@ -101,6 +109,11 @@ impl Robot {
         Self::parse(file, &text, options).map_err(Faults::new)
     }
 
+    /// A monitor of this arm, by what stands for its collision geometry, in an empty scene.
+    pub fn monitor(&self) -> Monitor {
+        self.monitor.clone()
+    }
+
     /// Reads the text of a URDF; `file` is its name in messages.
     ///
     /// # Errors
@@ -114,11 +127,12 @@ impl Robot {
         let mut faults = Vec::new();
         let joints = moving_joints(&source, &urdf, &tree, options, &mut faults);
         let mut links = inertia::links(&source, &urdf, &tree, &mut faults);
-        let mut meshes = shape::Meshes { urdf: file, packages: &options.packages, read: Vec::new() };
-        let capsules = shape::capsules(&source, &urdf, &tree, &mut meshes, &mut faults);
-        let meshes = meshes.read;
-        if capsules.len() > LINK_CAPSULES_MAX {
-            let found = format!("{} capsules around its links", capsules.len());
+        let (packages, collision) = (&options.packages[..], options.collision);
+        let mut covering = shape::Covering { urdf: file, packages, collision, read: Vec::new(), notes: Vec::new() };
+        let covers = shape::covers(&source, &urdf, &tree, &mut covering, &mut faults);
+        let (meshes, mut notes) = (covering.read, covering.notes);
+        if covers.len() > LINK_CAPSULES_MAX {
+            let found = format!("{} capsules around its links", covers.len());
             let allowed = format!("at most {LINK_CAPSULES_MAX}");
             faults.push(source.fault_of_robot("robot", &found, &allowed, "give the links fewer collision shapes"));
         }
@@ -132,19 +146,32 @@ impl Robot {
             }
             None => BTreeSet::new(),
         };
-        let notes = inertia::put_right(&mut links, &capsules);
+        let capsules: Vec<LinkCapsule> = covers.iter().map(|cover| cover.capsule).collect();
+        notes.extend(inertia::put_right(&mut links, &capsules));
 
         let of_robot =
             |error: &dyn std::fmt::Display| vec![source.fault_of_robot("", &error.to_string(), "", "mend the file")];
         let chain = Chain::new(&joints, tree.tip_from_tcp).map_err(|error| of_robot(&error))?;
         let home = home(&chain, options);
-        let body = body(&chain, &capsules, &home, &allowed).map_err(|error| of_robot(&error))?;
+        let mut shapes = Shapes::new();
+        let hulls = register(&covers, &mut shapes).map_err(|error| of_robot(&error))?;
+        let shapes = Arc::new(shapes);
+        let monitor = |pairs: &[[usize; 2]]| {
+            let mut body = ArmBody::new(&capsules, pairs)?;
+            hulls.iter().try_for_each(|(capsule, hull)| body.refine(*capsule, *hull))?;
+            Monitor::with_shapes(body, Arc::clone(&shapes))
+        };
+        let unpaired = monitor(&[]).map_err(|error| of_robot(&error))?;
+        let mut pairs = contact::pairs_to_check(&unpaired, &chain, &home);
+        pairs.retain(|pair| !allowed.contains(pair));
+        let monitor = monitor(&pairs).map_err(|error| of_robot(&error))?;
         Ok(Self {
             name: urdf.name.clone(),
             file: file.to_owned(),
             joint_names: tree.chain.iter().map(|joint| urdf.joints[joint.index].name.clone()).collect(),
             chain,
-            body,
+            body: *monitor.body(),
+            monitor,
             links,
             meshes,
             notes,
@@ -154,15 +181,10 @@ impl Robot {
     }
 }
 
-fn body(
-    chain: &Chain,
-    capsules: &[LinkCapsule],
-    home: &[f64; JOINTS_MAX],
-    allowed: &BTreeSet<[usize; 2]>,
-) -> Result<ArmBody, tandem_clearance::BodyError> {
-    let mut pairs = contact::pairs_to_check(chain, capsules, home)?;
-    pairs.retain(|pair| !allowed.contains(pair));
-    ArmBody::new(capsules, &pairs)
+/// Registers the hulls of all covers: which capsule each of them stands for, and its number.
+fn register(covers: &[Cover], shapes: &mut Shapes) -> Result<Vec<(usize, u32)>, ShapeError> {
+    let hulls = covers.iter().enumerate().filter_map(|(capsule, cover)| Some((capsule, cover.hull.as_ref()?)));
+    hulls.map(|(capsule, points)| Ok((capsule, shapes.add_hull(points)?))).collect()
 }
 
 fn home(chain: &Chain, options: &RobotOptions) -> [f64; JOINTS_MAX] {

@@ -314,3 +314,21 @@ fn the_resting_configuration_is_checked_against_the_arm() {
         )]
     );
 }
+
+/// What stands for the arm's shape is one of two names; both make a cell.
+#[test]
+fn the_collision_geometry_is_capsules_or_hulls() {
+    const URDF: &str = "urdf = \"../robots/ur10.urdf\"\n";
+    for (named, fault) in [
+        ("hulls", ""),
+        ("capsules", ""),
+        ("spheres", "robot.collision = \"spheres\", allowed capsules, hulls; choose one of these names"),
+    ] {
+        let files = Files::new();
+        files.spoil(CELL, URDF, &format!("{URDF}collision = \"{named}\"\n"));
+        let at = files.at(CELL, &format!("\"{named}\""));
+        let expected: Vec<String> =
+            [fault].iter().filter(|text| !text.is_empty()).map(|text| format!("{CELL}:{at}: {text}")).collect();
+        assert_eq!(files.faults(), expected);
+    }
+}

@@ -2,7 +2,8 @@
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
-use tandem_config::{Robot, RobotOptions};
+use tandem_config::{Collision, Robot, RobotOptions};
+use tandem_msg::{Pose, SceneObject, ShapeKind};
 
 /// A slider with a turning head that carries a gripper of two fingers, the second a mimic.
 const ARM: &str = r#"<robot name="arm">
@@ -67,9 +68,36 @@ fn meshes_and_locked_joints_load() {
     let fingers: Vec<f64> =
         robot.body.capsules().iter().filter(|c| c.radius == 0.01).map(|capsule| capsule.ends[0][1]).collect();
     assert_eq!(fingers, [0.02, -0.021]);
-    // The same package named by its own folder.
-    let own = RobotOptions { packages: vec![file.parent().expect("a folder").to_owned()], ..options };
-    assert!(Robot::parse(&file, ARM, &own).is_ok());
+    // The same package named by its own folder, and found around the file.
+    for packages in [vec![file.parent().expect("a folder").to_owned()], Vec::new()] {
+        assert!(Robot::parse(&file, ARM, &RobotOptions { packages, ..options.clone() }).is_ok());
+    }
+}
+
+/// A small ball beside the slider's prism: the hull is as far off as the mesh, the capsule nearer. What is flat
+/// stays a capsule, and said so.
+#[test]
+fn hulls_stand_for_meshes_when_asked_for() {
+    let (_folder, file, options) = package();
+    let ball = SceneObject {
+        id: 1,
+        shape: ShapeKind::Sphere.into(),
+        size: [0.01, 0.0, 0.0],
+        base_from_object: Pose { position: [-0.1, 0.02, 1.1], ..Pose::IDENTITY },
+    };
+    let clearance = |collision: Collision| {
+        let options = RobotOptions { collision, ..options.clone() };
+        let robot = Robot::parse(&file, ARM, &options).unwrap_or_else(|faults| panic!("{faults:?}"));
+        let mut monitor = robot.monitor();
+        monitor.set_scene(&[ball]).expect("a ball is a scene");
+        (monitor.clearance(&robot.chain.forward(&robot.home)), robot.notes)
+    };
+    let (by_capsules, notes) = clearance(Collision::Capsules);
+    assert!((by_capsules.distance - 0.0797).abs() < 1e-3 && by_capsules.link == 1, "{by_capsules:?}");
+    assert!(notes.is_empty(), "{notes:?}");
+    let (by_hulls, notes) = clearance(Collision::Hulls);
+    assert!(by_hulls.distance <= 0.09 && by_hulls.distance > 0.09 - 1e-6 && by_hulls.link == 1, "{by_hulls:?}");
+    assert_eq!(notes, ["link \"head\": its mesh is flat, so a capsule stands for it"]);
 }
 
 /// What is missing, broken or of another format is told with its place.
@@ -78,8 +106,8 @@ fn bad_meshes_are_refused_with_their_place() {
     let (folder, file, options) = package();
     let nowhere = RobotOptions { packages: Vec::new(), ..options.clone() };
     assert_eq!(
-        refusal(&file, ARM, &nowhere),
-        "…/arm.urdf:4:49: link \"slider\" collision mesh = \"package://my-arm/meshes/slider.stl\"; \
+        refusal(&file, &ARM.replacen("my-arm", "your-arm", 1), &nowhere),
+        "…/arm.urdf:4:49: link \"slider\" collision mesh = \"package://your-arm/meshes/slider.stl\"; \
          list the folders of packages as robot.packages of the cell, or in ROS_PACKAGE_PATH"
     );
     let with = |from: &str, to: &str| refusal(&file, &ARM.replacen(from, to, 1), &options);

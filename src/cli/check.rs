@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use tandem_config::Cell;
+use tandem_config::{Cell, Robot};
 
 use super::exit;
 use super::run::store_url;
@@ -41,17 +41,20 @@ pub(super) fn check(args: &CheckArgs) -> u8 {
     };
     let findings = examine(&cell, args.store.as_deref());
     let failed = findings.iter().filter(|finding| finding.result.is_err()).count();
-    for Finding { subject, result } in &findings {
-        let (word, text) = match result {
-            Ok(text) => ("ok", text),
-            Err(text) => ("refused", text),
-        };
+    let print = |word: &str, subject: &str, text: &str| {
         if args.json {
             anstream::println!("{}", json!({"event": "checked", "subject": subject, "verdict": word, "text": text}));
         } else {
             anstream::println!("{word:8}{subject:12}{text}");
         }
+    };
+    for Finding { subject, result } in &findings {
+        match result {
+            Ok(text) => print("ok", subject, text),
+            Err(text) => print("refused", subject, text),
+        }
     }
+    cell.robot.notes.iter().for_each(|note| print("note", "robot", note));
     if failed > 0 { exit::CONFIG } else { exit::OK }
 }
 
@@ -78,10 +81,7 @@ fn examine(cell: &Cell, store: Option<&str>) -> Vec<Finding> {
             subject: "product",
             result: Ok(format!("{}: {} part types", cell.product.label, cell.product.parts.len())),
         },
-        Finding {
-            subject: "robot",
-            result: Ok(format!("{}: {} joints", cell.robot.name, cell.robot.chain.joint_count())),
-        },
+        Finding { subject: "robot", result: Ok(robot(&cell.robot)) },
     ];
     findings.extend(roles(cell));
     let store = store_url(store, cell)
@@ -90,6 +90,17 @@ fn examine(cell: &Cell, store: Option<&str>) -> Vec<Finding> {
         .map_err(|error| error.to_string());
     findings.push(Finding { subject: "store", result: store });
     findings
+}
+
+/// The arm in a line.
+fn robot(robot: &Robot) -> String {
+    let monitor = robot.monitor();
+    let (shapes, joints) = (monitor.body().capsules().len(), robot.chain.joint_count());
+    let hulls = (0..shapes).filter(|capsule| monitor.hull_points(*capsule).next().is_some()).count();
+    let pairs = monitor.body().self_pairs().count();
+    let meshes = robot.meshes.len();
+    let name = &robot.name;
+    format!("{name}: {joints} joints, {shapes} shapes of which {hulls} hulls, {pairs} pairs checked, {meshes} meshes")
 }
 
 /// Builds the roles a run would build.

@@ -100,7 +100,7 @@ fn perception(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), L
 }
 
 fn controller(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), LiveError> {
-    let controller = Controller::new(cell.robot.chain, cell.robot.body, cell.controller);
+    let controller = Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller);
     let controller = controller.map_err(refused(Role::Controller))?;
     let node = join(args.role, args.epoch, cell, instance);
     let mut role = ControllerRole::open(&node, controller)?;

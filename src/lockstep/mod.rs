@@ -232,7 +232,7 @@ impl SimCell {
 /// Parameters it refuses.
 pub fn build_controller(cell: &Cell) -> Result<Controller, SimError> {
     let refused = |error| SimError(format!("controller: {error}"));
-    Controller::new(cell.robot.chain, cell.robot.body, cell.controller).map_err(refused)
+    Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller).map_err(refused)
 }
 
 fn identity(role: Role, epoch: u64, config_hash: u64) -> Identity {

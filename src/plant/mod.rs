@@ -159,7 +159,7 @@ impl Plant {
         let drive = Drive::new(&model.arm.joints, &model.arm.home, model.config_hash);
         let arm = Arm::new(model.arm, &mut world);
         Self {
-            referee: Referee::new(&model.capsules, &model.obstacles, parts.count()),
+            referee: Referee::new(&model.links, &model.obstacles, parts.count()),
             base_from_tcp: arm.base_from_tcp(),
             effector: Effector::new(model.effector),
             feeder: Feeder::new(model.feeder),

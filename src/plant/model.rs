@@ -27,7 +27,8 @@ const CUP_LOAD: f64 = 6.0;
 /// Everything the plant is made of, in its own terms.
 pub(crate) struct PlantModel {
     pub(super) arm: ArmModel,
-    pub(super) capsules: Vec<LinkCapsule>,
+    /// Each capsule of the arm, and corners of the hull that stands for it where one does.
+    pub(super) links: Vec<(LinkCapsule, Vec<[f64; 3]>)>,
     pub(super) obstacles: Vec<Obstacle>,
     pub(super) effector: EffectorModel,
     pub(super) parts: Vec<PartModel>,
@@ -47,7 +48,7 @@ impl PlantModel {
         let base_from_fixture = cell.layout.base_from_fixture;
         Ok(Self {
             arm: arm(&cell.robot)?,
-            capsules: cell.robot.body.capsules().to_vec(),
+            links: links(cell),
             obstacles: obstacles(cell),
             effector: effector(cell),
             parts: cell.product.parts.iter().map(|part| part_model(part, &base_from_fixture)).collect(),
@@ -89,6 +90,13 @@ fn arm(robot: &Robot) -> Result<ArmModel, PlantError> {
         },
     });
     Ok(ArmModel { joints: joints.collect(), flange_from_tcp: *robot.chain.tool(), home: robot.home })
+}
+
+/// The capsules of the arm and the hulls in them.
+fn links(cell: &Cell) -> Vec<(LinkCapsule, Vec<[f64; 3]>)> {
+    let monitor = cell.robot.monitor();
+    let capsules = monitor.body().capsules().iter().enumerate();
+    capsules.map(|(index, capsule)| (*capsule, monitor.hull_points(index).collect())).collect()
 }
 
 fn obstacles(cell: &Cell) -> Vec<Obstacle> {

@@ -17,7 +17,7 @@ use core::time::Duration;
 use nalgebra::{Isometry3, Vector3};
 use rapier3d_f64::math::Pose as BodyPose;
 use rapier3d_f64::parry::query::intersection_test;
-use rapier3d_f64::parry::shape::{Capsule, Cuboid, Shape};
+use rapier3d_f64::parry::shape::{Capsule, Cuboid, Shape, SharedShape};
 use tandem_clearance::LinkCapsule;
 use tandem_msg::Stamp;
 
@@ -67,27 +67,58 @@ pub(super) struct Look<'a> {
     pub(super) hand_on: Option<usize>,
 }
 
+/// What a piece is.
+#[derive(Clone)]
+enum Form {
+    Capsule(Capsule),
+    Cuboid(Cuboid),
+    Hull(SharedShape),
+}
+
+impl Form {
+    fn capsule(ends: &[Vector3<f64>; 2], radius: f64) -> Self {
+        Self::Capsule(Capsule::new(vector(&ends[0]), vector(&ends[1]), radius))
+    }
+
+    /// The hull of some points, each moved inwards by [`DEPTH`]; `None` when that is no solid.
+    fn hull(points: &[[f64; 3]]) -> Option<Self> {
+        let sum: Vector3<f64> = points.iter().map(|point| Vector3::from(*point)).sum();
+        let centre = sum / points.len().max(1) as f64;
+        let inwards = |x: f64| x.signum() * (x.abs() - DEPTH).max(0.0);
+        let moved = points.iter().map(|point| vector(&(centre + (Vector3::from(*point) - centre).map(inwards))));
+        SharedShape::convex_hull(&moved.collect::<Vec<_>>()).map(Self::Hull)
+    }
+
+    fn shape(&self) -> &dyn Shape {
+        match self {
+            Self::Capsule(capsule) => capsule,
+            Self::Cuboid(cuboid) => cuboid,
+            Self::Hull(hull) => &**hull,
+        }
+    }
+}
+
 /// A convex piece of arm, part or person with a sphere around it.
-struct Piece<S> {
-    shape: S,
+struct Piece {
+    form: Form,
     pose: BodyPose,
     centre: Vector3<f64>,
     reach: f64,
 }
 
-/// A capsule of the arm with the middle of its segment and the radius of the sphere
-/// around it, in the frame of its link.
+/// A capsule of the arm, or the hull in it, with the middle of the capsule's segment and the radius of the
+/// sphere around it, in the frame of its link.
 struct Link {
     link: usize,
     tool: bool,
-    shape: Capsule,
+    form: Form,
     centre: Vector3<f64>,
     reach: f64,
 }
 
 struct Solid {
     kind: Kind,
-    piece: Piece<Cuboid>,
+    piece: Piece,
 }
 
 /// The referee and the count.
@@ -112,16 +143,17 @@ enum Mover {
 
 impl Referee {
     /// A referee who has seen nothing yet. The base link stands on the bench and is not looked at.
-    pub(super) fn new(arm: &[LinkCapsule], fixed: &[Obstacle], parts: usize) -> Self {
+    pub(super) fn new(arm: &[(LinkCapsule, Vec<[f64; 3]>)], fixed: &[Obstacle], parts: usize) -> Self {
         let links = arm
             .iter()
-            .filter(|capsule| capsule.link > 0)
-            .map(|capsule| {
+            .filter(|(capsule, _)| capsule.link > 0)
+            .map(|(capsule, hull)| {
                 let [a, b] = capsule.ends.map(Vector3::from);
                 Link {
                     link: capsule.link,
                     tool: capsule.tool,
-                    shape: Capsule::new(vector(&a), vector(&b), (capsule.radius - DEPTH).max(1e-4)),
+                    form: Form::hull(hull)
+                        .unwrap_or_else(|| Form::capsule(&[a, b], (capsule.radius - DEPTH).max(1e-4))),
                     centre: (a + b) / 2.0,
                     reach: (a - b).norm() / 2.0 + capsule.radius,
                 }
@@ -183,7 +215,7 @@ impl Referee {
         for link in &self.links {
             let Some(frame) = look.base_from_link.get(link.link) else { continue };
             let piece = Piece {
-                shape: link.shape,
+                form: link.form.clone(),
                 pose: body_pose(frame),
                 centre: frame.transform_point(&link.centre.into()).coords,
                 reach: link.reach,
@@ -200,9 +232,9 @@ impl Referee {
     }
 
     #[allow(clippy::too_many_arguments)]
-    fn meet<S: Shape>(
+    fn meet(
         &self,
-        piece: &Piece<S>,
+        piece: &Piece,
         mover: Mover,
         allowed: &dyn Fn(Mover, Kind) -> bool,
         look: &Look<'_>,
@@ -235,17 +267,17 @@ fn near_home(parts: &Parts, part: usize) -> bool {
     parts.model(part).is_some_and(|model| apart(&parts.base_from_part(part), &model.base_from_place).0 < NEAR)
 }
 
-fn cuboid(pose: &Isometry3<f64>, half: [f64; 3]) -> Piece<Cuboid> {
+fn cuboid(pose: &Isometry3<f64>, half: [f64; 3]) -> Piece {
     let half = Vector3::from(half);
     Piece {
-        shape: Cuboid::new(vector(&half)),
+        form: Form::Cuboid(Cuboid::new(vector(&half))),
         pose: body_pose(pose),
         centre: pose.translation.vector,
         reach: half.norm(),
     }
 }
 
-fn blocks(parts: &Parts, part: usize) -> impl Iterator<Item = Piece<Cuboid>> {
+fn blocks(parts: &Parts, part: usize) -> impl Iterator<Item = Piece> {
     let pose = parts.base_from_part(part);
     let blocks: &[Block] = parts.model(part).map_or(&[], |model| &model.blocks);
     blocks.iter().map(move |block| {
@@ -254,18 +286,18 @@ fn blocks(parts: &Parts, part: usize) -> impl Iterator<Item = Piece<Cuboid>> {
     })
 }
 
-fn limb_piece(limb: &Limb) -> Piece<Capsule> {
+fn limb_piece(limb: &Limb) -> Piece {
     let [a, b] = limb.ends;
     Piece {
-        shape: Capsule::new(vector(&a), vector(&b), limb.radius - DEPTH),
+        form: Form::capsule(&limb.ends, limb.radius - DEPTH),
         pose: BodyPose::IDENTITY,
         centre: (a + b) / 2.0,
         reach: (a - b).norm() / 2.0 + limb.radius,
     }
 }
 
-fn overlap<A: Shape, B: Shape>(a: &Piece<A>, b: &Piece<B>) -> bool {
+fn overlap(a: &Piece, b: &Piece) -> bool {
     let together = a.reach + b.reach;
     (a.centre - b.centre).norm_squared() <= together * together
-        && intersection_test(&a.pose, &a.shape, &b.pose, &b.shape).is_ok_and(|met| met.intersecting)
+        && intersection_test(&a.pose, a.form.shape(), &b.pose, b.form.shape()).is_ok_and(|met| met.intersecting)
 }

@@ -136,6 +136,14 @@ impl Monitor {
         &self.body
     }
 
+    /// Corners of the hull that stands for a capsule of the arm, in the frame of its link, metres, some of
+    /// them more than once; none where no hull does.
+    pub fn hull_points(&self, capsule: usize) -> impl Iterator<Item = [f64; 3]> + '_ {
+        let number = self.body.hulls().get(capsule).copied().unwrap_or(0);
+        let hull = self.shapes.as_deref().and_then(|shapes| shapes.hull(number));
+        hull.into_iter().flat_map(|hull| hull.points()).map(Into::into)
+    }
+
     /// Replaces the scene.
     ///
     /// # Errors
@@ -332,8 +340,9 @@ impl Monitor {
         part_to_arm(arm, enough, best);
     }
 
-    /// Distance of two links, whether the pair is to be checked or not.
-    pub(crate) fn link_distance(&self, poses: &LinkPoses, links: [usize; 2]) -> f64 {
+    /// Distance of two links, whether the pair is to be checked or not: +∞ when one has no shape, −∞ when a
+    /// number was not finite.
+    pub fn link_distance(&self, poses: &LinkPoses, links: [usize; 2]) -> f64 {
         let mut arm = self.unplaced(poses);
         if !arm.place() {
             return f64::NEG_INFINITY;
@@ -373,6 +382,13 @@ impl Monitor {
             human_velocity: self.velocities[capsule],
             point_on_arm: best.point_on_arm,
         }
+    }
+}
+
+impl From<ArmBody> for Monitor {
+    /// See [`Monitor::new`].
+    fn from(body: ArmBody) -> Self {
+        Self::new(body)
     }
 }
 

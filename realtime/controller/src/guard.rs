@@ -10,7 +10,7 @@
 //! one clearance query a cycle; a changed scene makes the sweep start again from
 //! where the arm is.
 
-use tandem_clearance::{ArmBody, Clearance, Monitor};
+use tandem_clearance::{Clearance, Monitor};
 use tandem_kinematics::{Chain, LinkPoses};
 use tandem_msg::{AttachedPart, HumanState, SceneObject, StopCause};
 
@@ -43,8 +43,7 @@ pub(crate) struct Guard {
 }
 
 impl Guard {
-    pub(crate) fn new(chain: &Chain, body: ArmBody, clearance_min: f64) -> Self {
-        let monitor = Monitor::new(body);
+    pub(crate) fn new(chain: &Chain, monitor: Monitor, clearance_min: f64) -> Self {
         let at = [f64::NAN; tandem_msg::JOINTS_MAX];
         let poses = chain.forward(&[0.0; tandem_msg::JOINTS_MAX]);
         let clearance = monitor.clearance(&poses);

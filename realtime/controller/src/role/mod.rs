@@ -5,7 +5,7 @@ mod recover;
 mod task;
 
 use nalgebra::Vector3;
-use tandem_clearance::{ArmBody, Monitor};
+use tandem_clearance::Monitor;
 use tandem_kinematics::Chain;
 use tandem_msg::{
     Code, HumanState, JOINTS_MAX, JointCommand, JointState, MotionPhase, MotionStatus, MotionTask, Planner, PlantFault,
@@ -85,18 +85,20 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// A controller of an arm, at rest and with nothing heard.
+    /// A controller of an arm, at rest and with nothing heard. What stands for the arm's shape is its capsules,
+    /// or with a [`Monitor`] that knows the hulls in them, those.
     ///
     /// # Errors
     /// Every parameter that is out of range.
-    pub fn new(chain: Chain, body: ArmBody, params: Params) -> Result<Self, ParamsError> {
+    pub fn new(chain: Chain, arm: impl Into<Monitor>, params: Params) -> Result<Self, ParamsError> {
         params.check()?;
+        let arm = arm.into();
         let mut velocity_max = [0.0; JOINTS_MAX];
         for (limit, joint) in velocity_max.iter_mut().zip(chain.joints()) {
             *limit = joint.velocity_max;
         }
         Ok(Self {
-            reach: Reach::new(&chain, &body),
+            reach: Reach::new(&chain, arm.body()),
             velocity_max,
             period: params.period.as_secs_f64(),
             watch: Watch::default(),
@@ -109,9 +111,9 @@ impl Controller {
             job: Job::none(),
             effector: Effector::default(),
             search: Search::new(),
-            planner: Monitor::new(body),
+            planner: arm.clone(),
             motion: Motion::new(&chain),
-            guard: Guard::new(&chain, body, params.clearance_min),
+            guard: Guard::new(&chain, arm, params.clearance_min),
             governor: Governor::new(&params.separation),
             law_level: 0,
             pace: Pace::new(),
