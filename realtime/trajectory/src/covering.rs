@@ -8,36 +8,17 @@ use crate::{
     sqrt::sqrt,
 };
 
-/// How far short of a distance counts as having covered it.
-///
-/// A motion recomputed every cycle from its own output collects roundings. Near a moving target there
-/// is nothing left with which to correct them, and a motion that misses by a rounding would go round
-/// once more.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Tie {
-    /// Anywhere.
-    pub(crate) tight: f64,
-    /// At the top of the curve, from where it would be a long way round.
-    pub(crate) loose: f64,
-}
-
-/// How many times the rounding of the inputs is forgiven where the alternative is a jump.
-const LOOSE: f64 = 32768.0;
-
-impl Tie {
-    /// `rounding` is that of the inputs, `allowed` what the caller allows.
-    pub(crate) fn new(rounding: f64, allowed: f64) -> Self {
-        Tie { tight: rounding + allowed, loose: LOOSE * rounding + allowed }
-    }
-}
+/// How many times the rounding of the inputs is forgiven where the alternative is a jump: at the top of the
+/// curve, from where it would be a long way round.
+pub(crate) const LOOSE: f64 = 32768.0;
 
 impl Extremal {
-    /// The first duration in `[from, to]` at which `distance` is covered, when at `from` the motion is
-    /// `shape` and covers less, `before`.
+    /// The first duration in `[from, to]` at which `distance` is covered, up to `rounding`, when at `from` the
+    /// motion is `shape` and covers less, `before`.
     pub(crate) fn first_covering(
         &self,
         distance: f64,
-        tie: Tie,
+        rounding: f64,
         from: f64,
         to: f64,
         mut shape: Shape,
@@ -60,11 +41,11 @@ impl Extremal {
             marks.push(end);
             for &mark in marks.sorted() {
                 let covered = self.distance_in(mark);
-                if covered >= distance - tie.tight {
+                if covered >= distance - rounding {
                     let middle = begin + (mark - begin) / 2.0;
                     return Some(if covered <= distance { mark } else { root_between(exact, begin, mark, middle) });
                 }
-                if covered < before && before >= distance - tie.loose {
+                if covered < before && before >= distance - LOOSE * rounding {
                     return Some(begin);
                 }
                 (begin, before) = (mark, covered);
@@ -74,7 +55,7 @@ impl Extremal {
         let end = to.min(self.peak_time);
         if begin < end {
             let slope = self.slope(&shape);
-            if before >= distance - tie.loose && slope < 0.0 {
+            if before >= distance - LOOSE * rounding && slope < 0.0 {
                 return Some(begin);
             }
             let covered = self.distance_in(end);
@@ -86,7 +67,7 @@ impl Extremal {
                     begin + parabola(slope, end - begin, covered - before, distance - before),
                 ));
             }
-            if covered >= distance - tie.tight {
+            if covered >= distance - rounding {
                 return Some(end);
             }
             if covered > before {
@@ -100,7 +81,7 @@ impl Extremal {
                 return Some(time);
             }
         }
-        (before >= distance - tie.loose).then_some(begin)
+        (before >= distance - LOOSE * rounding).then_some(begin)
     }
 
     /// The duration from which on P(T) is convex until the cruise begins: that at which the fall first

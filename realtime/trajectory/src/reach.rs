@@ -12,22 +12,28 @@
 //! two extremal motions starts and ends in the right states, covers `D`, and keeps every limit,
 //! because each limit holds for both and is convex. Its jerk takes at most 13 constant values.
 
+//!
+//! **A motion recomputed every cycle from its own output** collects roundings. In its last phases it is at its
+//! limits, with nothing left to correct them: a distance too far by `d` then costs a swing past the target and
+//! back, of duration `cbrt(32 d / jerk)`, which for a rounding is microseconds, and near a moving target all
+//! the way round once more. So a miss that such roundings explain is no miss ([`Reach::covering`]).
+
 use crate::{
-    covering::Tie,
+    covering::LOOSE,
     extremal::{Extremal, Joint, Shape},
     motion::Phases,
-    state::State,
-    swing::{ARRIVAL_SHARE, Durations, Swing},
+    sqrt::sqrt,
+    swing::{ARRIVAL_SHARE, COLLECTED, Durations, Swing},
 };
 
 /// Durations this close, relatively, differ by rounding.
 const ARRIVAL_TIE: f64 = 8.0 * f64::EPSILON;
 
-/// The same share of the distance that is run without the jerk.
-const ARRIVAL_RUN: f64 = 1e-6;
-
-/// Roundings that a motion recomputed from its own output collects in its last moments.
+/// Roundings of a position that a motion recomputed from its own output collects.
 const ROUNDINGS: f64 = 64.0;
+
+/// The way gone in the time that a correction takes may be so many times the miss.
+const DISPROPORTIONATE: f64 = 4.0;
 
 /// One joint's position problem: its velocity problem and the distance to cover.
 #[derive(Clone, Copy, Debug)]
@@ -69,19 +75,72 @@ impl Reach {
         let velocities = joint.start[0].abs() + joint.end[0].abs();
         let far = Extremal::new(joint);
         let swing = Swing::of(&joint);
-        let arrival = swing.straight(velocities, joint.peak.max(-velocity_min)).filter(|time| {
-            let off = distance - swing.straight_distance(*time, joint.start[0]);
-            let rounding = rounding + far.distance_known(*time).1;
-            let tie = Tie::new(rounding, allowed);
-            let bend = (joint.end[1] - joint.start[1]).abs() * time * time;
-            let run = (joint.start[0].abs() + joint.end[0].abs()) * time;
-            let work = (ARRIVAL_SHARE * bend).max(ARRIVAL_RUN * run);
-            off.abs() <= tie.tight + ROUNDINGS * rounding + (tie.loose - allowed).min(work)
-        });
         let durations = swing.durations(velocities);
-        let arrival = arrival.unwrap_or(-1.0);
         let found = Mixture { time: f64::NAN, far: far.peak_shape, near: far.peak_shape, share: 1.0 };
-        Reach { far, near: None, velocity_min, durations, distance, rounding, allowed, arrival, found }
+        let (near, arrival) = (None, -1.0);
+        let mut reach = Reach { far, near, velocity_min, durations, distance, rounding, allowed, arrival, found };
+        if let Some(time) = swing.straight(velocities, joint.peak.max(-velocity_min)) {
+            let off = (distance - swing.straight_distance(time, joint.start[0])).abs();
+            let work = ((joint.end[1] - joint.start[1]).abs() * time * time).max(velocities * time);
+            let rounding = rounding + reach.far.distance_known(time).1;
+            if off <= allowed + ROUNDINGS * rounding + reach.collected(rounding, work) {
+                reach.arrival = time;
+            }
+        }
+        reach
+    }
+
+    /// What collected roundings may make of a position, of which a single one is `rounding`: those of the way
+    /// on which the joint brakes from its highest velocity, so far as it explains them by its position or by
+    /// the `work` of the motion.
+    fn collected(&self, rounding: f64, work: f64) -> f64 {
+        // Where there is no work, nothing has been collected on it.
+        let explained = if work > 0.0 { LOOSE * rounding + ARRIVAL_SHARE * work } else { 0.0 };
+        explained.min(2.0 * COLLECTED * self.braking())
+    }
+
+    /// The way on which the joint brakes from its highest velocity, or somewhat more.
+    fn braking(&self) -> f64 {
+        let Joint { peak, top, bottom, .. } = self.far.joint;
+        let speed = peak.max(-self.velocity_min);
+        speed * (speed / top.min(bottom) + 2.0 * sqrt(speed * self.far.mean))
+    }
+
+    /// How far off a motion of duration `time` may be found to end.
+    pub(crate) fn slack(&self, time: f64) -> f64 {
+        let known = self.far.distance_known(time).1;
+        self.allowed + 2.0 * COLLECTED * self.braking() + LOOSE * (self.rounding + known)
+    }
+
+    /// The first duration in `[from, to]` at which `extremal` covers `distance`, when at `from` it is `shape` and
+    /// covers less, `before`; one at which it misses, if to correct that is out of proportion.
+    fn covering(
+        &self,
+        extremal: &Extremal,
+        (distance, rounding): (f64, f64),
+        (from, to): (f64, f64),
+        (shape, before): (Shape, f64),
+    ) -> Option<f64> {
+        let first = |distance: f64| extremal.first_covering(distance, rounding, from, to, shape, before);
+        let exact = first(distance);
+        let off = distance - self.allowed - before;
+        if off <= COLLECTED * self.braking() && self.takes_too_long(off, from, exact) {
+            return Some(from);
+        }
+        if self.allowed > 0.0
+            && let Some(sooner) = first(distance - self.allowed)
+            && self.takes_too_long(self.allowed, sooner, exact)
+        {
+            return Some(sooner);
+        }
+        exact
+    }
+
+    /// Whether to correct a miss by `off` is out of proportion, if that takes from one time to another.
+    fn takes_too_long(&self, off: f64, from: f64, to: Option<f64>) -> bool {
+        let Joint { start: [v0, a0], end: [vf, af], .. } = self.far.joint;
+        let longer = to.map_or(f64::INFINITY, |to| to - from);
+        longer * (v0.abs() + vf.abs() + longer * (a0.abs() + af.abs())) > DISPROPORTIONATE * off
     }
 
     pub(crate) fn joint(&self) -> &Joint {
@@ -94,29 +153,21 @@ impl Reach {
         self.near.get_or_insert_with(|| Extremal::new(joint.mirrored(velocity_max)))
     }
 
-    /// How long the rest takes if one jerk does it up to roundings, or else the fastest change of velocity,
-    /// on which the acceleration keeps its sign and so the velocity its limits; else negative.
-    pub(crate) fn arrival(&self) -> f64 {
-        if self.arrival >= 0.0 {
-            return self.arrival;
-        }
-        let Joint { start: [velocity, before], end: [_, after], rise, fall, .. } = self.far.joint;
-        let jerks = [-1.0 / fall, 0.0, 1.0 / rise];
-        let time = self.durations.first;
-        let mut state = State { position: 0.0, velocity, acceleration: before };
-        for phase in Swing::of(&self.far.joint).waiting(time, velocity) {
-            if phase.acceleration * (before + after) < 0.0 {
-                return -1.0;
-            }
-            let jerk = jerks[(phase.slope + 1).clamp(0, 2) as usize];
-            state = State { velocity: phase.velocity, acceleration: phase.acceleration, ..state };
-            state = state.advanced(phase.duration, jerk);
-        }
-        let off = (self.distance - state.position).abs();
-        let run = (velocity.abs() + state.velocity.abs()) * time;
-        let rounding = self.rounding + self.far.distance_known(time).1;
-        let tie = ROUNDINGS * rounding + (Tie::new(rounding, 0.0).loose).min(ARRIVAL_RUN * run);
-        if before * after >= 0.0 && off <= tie + self.allowed { time } else { -1.0 }
+    /// Whether the acceleration keeps its sign in the motion that takes `time`, and with it the velocity the
+    /// limits that it keeps at both ends.
+    pub(crate) fn keeps_sign(&mut self, time: f64) -> bool {
+        let Mixture { far, near, share, .. } = self.mixture(time);
+        let before = self.far.joint.start[1];
+        let keeps = |shape: &Shape, sign: f64| {
+            shape.cruise == 0.0 && sign * shape.high * before >= 0.0 && sign * shape.low * before >= 0.0
+        };
+        (share == 0.0 || keeps(&far, 1.0)) && (share == 1.0 || keeps(&near, -1.0))
+    }
+
+    /// The same problem from another start.
+    pub(crate) fn started(&self, start: [f64; 2], distance: f64) -> Self {
+        let joint = Joint { start, ..self.far.joint };
+        Reach::new(joint, self.velocity_min, distance, self.rounding, self.allowed)
     }
 
     /// Whether one jerk does the rest in no less than `time`.
@@ -144,23 +195,22 @@ impl Reach {
     /// If the distance lies above the interval at `from`, it enters it by crossing the upper end, and
     /// the lower end is no obstacle there, being lower; and the other way round.
     fn next_before(&mut self, from: f64, to: f64) -> Option<f64> {
-        let (distance, rounding, allowed) = (self.distance, self.rounding, self.allowed);
+        let distance = self.distance;
         let far = self.far.shape(from);
         let high = self.far.distance(&far);
-        let tie = Tie::new(rounding + self.far.tolerance(from, &far), allowed);
-        if distance > high + tie.tight {
-            let time = self.far.first_covering(distance, tie, from, to, far, high)?;
+        let rounding = self.rounding + self.far.tolerance(from, &far);
+        if distance > high + self.allowed + rounding {
+            let time = self.covering(&self.far, (distance, rounding), (from, to), (far, high))?;
             let far = self.far.shape(time);
             self.found = Mixture { time, far, near: far, share: 1.0 };
             return Some(time);
         }
-        let extremal = self.near();
-        let near = extremal.shape(from);
-        let low = -extremal.distance(&near);
-        let tie = Tie::new(rounding + extremal.tolerance(from, &near), allowed);
-        if distance < low - tie.tight {
-            let time = extremal.first_covering(-distance, tie, from, to, near, -low)?;
-            let near = extremal.shape(time);
+        let near = self.near().shape(from);
+        let low = -self.near().distance(&near);
+        let rounding = self.rounding + self.near().tolerance(from, &near);
+        if distance < low - self.allowed - rounding {
+            let time = self.covering(self.near.as_ref()?, (-distance, rounding), (from, to), (near, -low))?;
+            let near = self.near().shape(time);
             self.found = Mixture { time, far, near, share: 0.0 };
             return Some(time);
         }

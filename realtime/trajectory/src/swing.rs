@@ -28,11 +28,11 @@ const TIE: f64 = 8.0 * f64::EPSILON;
 /// recomputed thousands of times from its own output.
 const LOOSE_TIE: f64 = 512.0 * TIE;
 
-/// Roundings of velocities up to the limit that a motion recomputed from its own output collects.
+/// Roundings that a motion recomputed from its own output collects, of the largest numbers on the way.
 pub(crate) const COLLECTED: f64 = 1024.0 * f64::EPSILON;
 
-/// The share of the last jerk's own work that its collected roundings may amount to.
-pub(crate) const ARRIVAL_SHARE: f64 = 1e-4;
+/// The share of what one jerk does that its collected roundings may amount to.
+pub(crate) const ARRIVAL_SHARE: f64 = 1.0 / 16.0;
 
 /// A change of velocity: `gain` while the acceleration goes from `start` to `end`.
 #[derive(Clone, Copy, Debug)]

@@ -7,7 +7,7 @@ use crate::{
     profile::Profile,
     reach::Reach,
     state::State,
-    swing::{COLLECTED, Durations, Swing},
+    swing::{Durations, Swing},
     writer::Writer,
 };
 
@@ -29,9 +29,19 @@ pub(crate) struct Task {
     begin: f64,
     /// How long the suffix takes that leads to a target outside the limits; 0 if it lies inside.
     tail: f64,
-    /// Duration of the motion without a prefix, if that is just the change of velocity, else negative: on
-    /// the way to a target about to leave the limits, the start is about to, too.
-    direct: f64,
+    /// The motion without a prefix, if there may be one.
+    direct: Option<Direct>,
+}
+
+/// A motion that needs no prefix although its start is bound to leave the limits: on the way to a target bound
+/// to leave them, too, it never lets its acceleration change its sign.
+#[derive(Clone, Copy, Debug)]
+struct Direct {
+    /// Velocity and acceleration of the start itself, and the distance from there.
+    start: [f64; 2],
+    distance: f64,
+    /// The duration last found.
+    found: f64,
 }
 
 // Boxing the larger variant would allocate in a cycle.
@@ -46,10 +56,11 @@ impl Task {
     /// The way of a checked `joint`.
     #[inline(always)]
     pub(crate) fn new(mut joint: Joint, input: &JointInput) -> Self {
-        let (mut begin, mut position, mut direct) = (0.0, input.start.position, -1.0);
+        let (mut begin, mut position, mut direct) = (0.0, input.start.position, None);
         if let Some(prefix) = prefix(&joint, input) {
-            if input.interface == Interface::Position {
-                direct = reach(joint, input, position).arrival();
+            if input.interface == Interface::Position && begins_inside(&joint, input.limits.velocity_min) {
+                let distance = input.target.position - position;
+                direct = Some(Direct { start: joint.start, distance, found: f64::NAN });
             }
             let mut scratch = Profile::EMPTY;
             let mut writer = Writer::new(&mut scratch, &input.limits, position, f64::INFINITY);
@@ -67,7 +78,7 @@ impl Task {
             writer.prefix(&suffix);
             (tail, joint.end) = (writer.now(), end);
             position += writer.position;
-            direct = -1.0;
+            direct = None;
         }
         let goal = match input.interface {
             Interface::Position => Goal::Position(reach(joint, input, position)),
@@ -82,21 +93,27 @@ impl Task {
     /// The first possible duration not below `time`; `time` itself unchanged if it is possible. `None` if
     /// there is none.
     pub(crate) fn next(&mut self, time: f64) -> Option<f64> {
-        if self.goes_direct(time) {
-            return Some(time.max(self.direct));
-        }
+        let direct = self.next_direct(time);
         let around = self.begin + self.tail;
         let passed = (time - around).max(0.0);
         let found = match &mut self.goal {
-            Goal::Position(reach) => reach.next(passed)?,
-            Goal::Velocity(_, durations) => durations.next(passed),
+            Goal::Position(reach) => reach.next(passed),
+            Goal::Velocity(_, durations) => Some(durations.next(passed)),
         };
-        Some(if found <= passed { time.max(around) } else { around + found })
+        let found = found.map(|found| if found <= passed { time.max(around) } else { around + found });
+        match (direct, found) {
+            (Some(direct), Some(found)) => Some(direct.min(found)),
+            (direct, found) => direct.or(found),
+        }
     }
 
-    /// Whether there is a motion without a prefix that takes no less than `time`.
-    fn goes_direct(&self, time: f64) -> bool {
-        time <= self.direct * (1.0 + DIRECT_TIE)
+    /// The first duration of a motion without a prefix that is not below `time`.
+    fn next_direct(&mut self, time: f64) -> Option<f64> {
+        let (Some(direct), Goal::Position(reach)) = (&mut self.direct, &self.goal) else { return None };
+        let mut reach = reach.started(direct.start, direct.distance);
+        let found = reach.next(time).filter(|found| reach.keeps_sign(*found));
+        direct.found = found.unwrap_or(f64::NAN);
+        found
     }
 
     /// The problem from the start itself to the target itself.
@@ -113,9 +130,10 @@ impl Task {
     /// `false` if the numbers left the range of doubles on the way.
     pub(crate) fn write(&mut self, input: &JointInput, duration: f64, profile: &mut Profile) -> bool {
         let mut writer = Writer::new(profile, &input.limits, input.start.position, duration);
-        if self.goes_direct(duration) {
-            let swing = Swing::of(&self.joint(input));
-            writer.follow(&swing.waiting(duration, input.start.velocity));
+        if let (Some(direct), Goal::Position(reach)) = (&self.direct, &self.goal)
+            && (direct.found - duration).abs() <= duration * DIRECT_TIE
+        {
+            write_reach(&mut reach.started(direct.start, direct.distance), duration, &mut writer);
         } else {
             let mut velocity = input.start.velocity;
             if self.begin > 0.0
@@ -144,15 +162,24 @@ impl Task {
             Interface::Velocity => State { position: reached, ..input.target },
         };
         let extent = writer.finish(target, input.start.position.abs() + target.position.abs());
-        // And what the roundings of velocities make of it that a motion recomputed from its output collects.
-        let speed = if input.interface == Interface::Position {
-            input.limits.velocity_max.max(-input.limits.velocity_min)
-        } else {
-            0.0
-        };
-        let allowed = SOUND * extent + input.tolerance + 8.0 * COLLECTED * speed * duration;
-        extent.is_finite() && (reached - target.position).abs() <= allowed
+        let off = (reached - target.position).abs();
+        let sound = off <= SOUND * extent
+            || match &self.goal {
+                Goal::Position(reach) => off <= reach.slack(duration),
+                Goal::Velocity(..) => false,
+            };
+        extent.is_finite() && sound
     }
+}
+
+/// Whether a start bound to leave the limits has not yet left them.
+fn begins_inside(joint: &Joint, velocity_min: f64) -> bool {
+    let ([velocity, acceleration], [_, last]) = (joint.start, joint.end);
+    velocity <= joint.peak
+        && velocity >= velocity_min
+        && acceleration <= joint.top
+        && acceleration >= -joint.bottom
+        && acceleration * last > 0.0
 }
 
 /// What brings a start outside the limits back.
