@@ -41,6 +41,7 @@ pub(crate) struct Prefix {
 
 /// The prefix of a joint starting at `joint.start`; `velocity_min` is its lowest velocity. `soft` asks
 /// for a return to the velocity limit that does not dip below it. `None` for a start within the limits.
+#[inline]
 pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Option<Prefix> {
     let [velocity, acceleration] = joint.start;
     // Whatever a start does that is within the limits and can stay there, nothing is to do.
@@ -50,6 +51,13 @@ pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Option<Pre
     if contained && velocity + rising <= joint.peak && velocity - falling >= velocity_min {
         return None;
     }
+    back(joint, velocity_min, soft)
+}
+
+/// The prefix of a start that is not within the limits; `None` if it is up to rounding.
+#[cold]
+fn back(joint: &Joint, velocity_min: f64, soft: bool) -> Option<Prefix> {
+    let [velocity, _] = joint.start;
     let mut prefix = Prefix::none(joint);
     if joint.rise + joint.fall == 0.0 {
         let (limit, braking) = if velocity > joint.peak {
@@ -73,6 +81,7 @@ pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Option<Pre
 }
 
 /// The prefix of a joint whose velocity is not limited.
+#[inline]
 pub(crate) fn acceleration_prefix(joint: &Joint) -> Option<Prefix> {
     let acceleration = joint.start[1];
     if joint.rise + joint.fall == 0.0 || (acceleration <= joint.top && acceleration >= -joint.bottom) {

@@ -47,7 +47,7 @@ impl Phases {
 /// The durations add up to `time` but for rounding. That goes into the longest phase of constant
 /// acceleration, where it does least harm: the phases before it are timed from the beginning, those
 /// after it from the end. Without such a phase the motion ends a rounding early or late.
-#[inline]
+#[inline(always)]
 pub(crate) fn starts(phases: &[Phase], begin: f64, time: f64) -> [Instant; 8] {
     let mut starts = [Instant::at(begin); 8];
     let (mut pivot, mut longest) = (7, 0.0);

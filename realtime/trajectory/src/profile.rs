@@ -55,20 +55,21 @@ impl Profile {
     pub(crate) fn drifting(state: State) -> Self {
         let mut profile = Self::EMPTY;
         profile.set(0, Instant::default(), state);
-        profile.set_codes(0, 0);
         profile
     }
 
-    /// Nothing written yet.
+    /// Nothing written yet: at rest at zero.
     pub(crate) const EMPTY: Self = {
+        let mut times = [f64::INFINITY; SEGMENTS_MAX];
+        times[0] = 0.0;
         Profile {
-            times: [f64::INFINITY; SEGMENTS_MAX],
+            times,
             positions: [0.0; SEGMENTS_MAX],
             velocities: [0.0; SEGMENTS_MAX],
             accelerations: [0.0; SEGMENTS_MAX],
             rests: [0.0; SEGMENTS_MAX - 1],
             jerks: [0.0; 5],
-            codes: 0,
+            codes: WHOLE[1] | 1 << 60,
         }
     };
 
@@ -89,9 +90,15 @@ impl Profile {
         self.accelerations[place] = state.acceleration;
     }
 
-    /// Sets what stands for the jerks of the segments before the end state, which is number `last`.
+    /// Sets what stands for the jerks of the segments before the end state, which is number `last`, and leaves
+    /// nothing behind that.
     pub(crate) fn set_codes(&mut self, codes: u64, last: usize) {
         let last = last.min(SEGMENTS_MAX - 1);
+        self.times[last + 1..].fill(f64::INFINITY);
+        self.positions[last + 1..].fill(0.0);
+        self.velocities[last + 1..].fill(0.0);
+        self.accelerations[last + 1..].fill(0.0);
+        self.rests[last..].fill(0.0);
         self.codes = codes | WHOLE[1] << (4 * last) | (last as u64 + 1) << 60;
     }
 

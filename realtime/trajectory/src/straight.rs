@@ -89,7 +89,7 @@ impl<const N: usize> Line<N> {
         let target = State { position: quantities[0][leader], ..own.target };
         let coordinate = JointInput { start, target, limits, ..own };
         let joint = input::check(leader, &coordinate)?;
-        Ok(Line { task: Task::new(joint, &coordinate), coordinate, leader, direction })
+        Ok(Line { task: *Task::begin(&mut None, joint, &coordinate), coordinate, leader, direction })
     }
 
     /// The motion of the line coordinate, unless it leaves the range of doubles.

@@ -110,10 +110,9 @@ impl Swing {
             }
             durations.gap_start = durations.gap_start.max(tip_time);
             durations
-        } else if gain > tip_gain {
-            self.above()
         } else {
-            self.mirrored().above()
+            let side = if gain > tip_gain { *self } else { self.mirrored() };
+            side.above()
         }
     }
 
@@ -136,12 +135,8 @@ impl Swing {
     /// Duration and gain of one jerk straight from `start` to `end`.
     fn tip(&self) -> (f64, f64) {
         let Swing { start, end, rise, fall, .. } = *self;
-        let squares = (end - start) * (end + start);
-        if end >= start {
-            (rise * (end - start), rise * squares / 2.0)
-        } else {
-            (fall * (start - end), -fall * squares / 2.0)
-        }
+        let change = if end >= start { rise } else { -fall };
+        (change * (end - start), change * ((end - start) * (end + start)) / 2.0)
     }
 
     /// The motion that makes the gain in `time`, which must be possible: up or down to some acceleration
@@ -159,19 +154,22 @@ impl Swing {
         let (tip_time, tip_gain) = self.tip();
         let rest = (time - tip_time).max(0.0);
         let (high, low) = (start.max(end), start.min(end));
+        // What is to gain beyond waiting at the higher acceleration, or at the lower.
+        let (more, less) = (gain - tip_gain - high * rest, tip_gain + low * rest - gain);
         let plateau = if rise + fall == 0.0 {
             if time > 0.0 { (gain / time).max(-bottom).min(top) } else { 0.0 }
-        } else if gain > tip_gain + high * rest {
-            above(high, gain - tip_gain - high * rest, rest, (rise + fall) / 2.0).min(top)
-        } else if gain < tip_gain + low * rest {
-            -above(-low, tip_gain + low * rest - gain, rest, (rise + fall) / 2.0).min(bottom)
+        } else if more > 0.0 || less > 0.0 {
+            let (sign, edge, more, limit) =
+                if more > 0.0 { (1.0, high, more, top) } else { (-1.0, -low, less, bottom) };
+            sign * above(edge, more, rest, (rise + fall) / 2.0).min(limit)
         } else if rest > 0.0 {
             ((gain - tip_gain) / rest).max(low).min(high)
         } else {
             start
         };
         let ramp = |from: f64, to: f64| {
-            if to >= from { (rise * (to - from), rise, 1) } else { (fall * (from - to), -fall, -1) }
+            let (change, slope) = if to >= from { (rise, 1) } else { (-fall, -1) };
+            (change * (to - from), change, slope)
         };
         let (first, change, slope) = ramp(start, plateau);
         let (last, _, slope_last) = ramp(plateau, end);
@@ -192,6 +190,7 @@ impl Swing {
     }
 
     /// Durations when the gain lies above that of the tip: `high` gives the first, `low` the gap.
+    #[inline]
     fn above(&self) -> Durations {
         let Swing { start, end, gain, top, rise, fall, .. } = *self;
         let turn = sqrt((2.0 * gain + rise * start * start + fall * end * end) / (rise + fall));

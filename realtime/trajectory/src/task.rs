@@ -53,41 +53,25 @@ enum Goal {
 }
 
 impl Task {
-    /// The way of a checked `joint`.
+    /// Puts the way of a checked `joint` into `slot`, each kind by itself, so that a small one is not moved as
+    /// if it were a large one.
     #[inline(always)]
-    pub(crate) fn new(mut joint: Joint, input: &JointInput) -> Self {
-        let (mut begin, mut position, mut direct) = (0.0, input.start.position, None);
-        if let Some(prefix) = prefix(&joint, input) {
-            if input.interface == Interface::Position && begins_inside(&joint, input.limits.velocity_min) {
-                let distance = input.target.position - position;
-                direct = Some(Direct { start: joint.start, distance, found: f64::NAN });
+    pub(crate) fn begin<'a>(slot: &'a mut Option<Self>, mut joint: Joint, input: &JointInput) -> &'a mut Self {
+        let Around { begin, tail, position, direct } = if prefix(&joint, input).is_some() || input.target_outside {
+            Around::take_off(&mut joint, input)
+        } else {
+            Around { begin: 0.0, tail: 0.0, position: input.start.position, direct: None }
+        };
+        match input.interface {
+            Interface::Position => {
+                slot.insert(Task { goal: Goal::Position(reach(joint, input, position)), begin, tail, direct })
             }
-            let mut scratch = Profile::EMPTY;
-            let mut writer = Writer::new(&mut scratch, &input.limits, position, f64::INFINITY);
-            writer.prefix(&prefix.steps);
-            (begin, position) = (writer.now(), writer.position);
-            joint.start = prefix.end;
-        }
-        let mut tail = 0.0;
-        if input.target_outside
-            && let Some(prefix) = prefix(&joint.reversed(), input)
-        {
-            let (suffix, end) = prefix.reversed();
-            let mut scratch = Profile::EMPTY;
-            let mut writer = Writer::new(&mut scratch, &input.limits, 0.0, f64::INFINITY);
-            writer.prefix(&suffix);
-            (tail, joint.end) = (writer.now(), end);
-            position += writer.position;
-            direct = None;
-        }
-        let goal = match input.interface {
-            Interface::Position => Goal::Position(reach(joint, input, position)),
             Interface::Velocity => {
                 let swing = Swing::of(&joint);
-                Goal::Velocity(swing, swing.durations(joint.start[0].abs() + joint.end[0].abs()))
+                let durations = swing.durations(joint.start[0].abs() + joint.end[0].abs());
+                slot.insert(Task { goal: Goal::Velocity(swing, durations), begin, tail, direct })
             }
-        };
-        Task { goal, begin, tail, direct }
+        }
     }
 
     /// The first possible duration not below `time`; `time` itself unchanged if it is possible. `None` if
@@ -126,10 +110,18 @@ impl Task {
         Joint { start: ends[0], end: ends[1], ..joint }
     }
 
-    /// Writes the motion that takes `duration`, which must be possible, to `profile`, which must be new;
+    /// Writes the motion that takes `duration`, which must be possible, to `profile`;
     /// `false` if the numbers left the range of doubles on the way.
     pub(crate) fn write(&mut self, input: &JointInput, duration: f64, profile: &mut Profile) -> bool {
         let mut writer = Writer::new(profile, &input.limits, input.start.position, duration);
+        if let Goal::Velocity(swing, _) = &self.goal
+            && self.begin == 0.0
+            && self.tail == 0.0
+        {
+            writer.follow_here(&swing.waiting(duration, input.start.velocity));
+            let target = State { position: writer.position, ..input.target };
+            return writer.finish(target, target.position.abs()).is_finite();
+        }
         if let (Some(direct), Goal::Position(reach)) = (&self.direct, &self.goal)
             && (direct.found - duration).abs() <= duration * DIRECT_TIE
         {
@@ -169,6 +161,47 @@ impl Task {
                 Goal::Velocity(..) => false,
             };
         extent.is_finite() && sound
+    }
+}
+
+/// What lies before and behind the motion within the limits.
+struct Around {
+    /// See [`Task`].
+    begin: f64,
+    tail: f64,
+    direct: Option<Direct>,
+    /// Where the motion within the limits would start if what lies behind it lay before.
+    position: f64,
+}
+
+impl Around {
+    /// Makes `joint` that of the motion within the limits.
+    #[cold]
+    fn take_off(joint: &mut Joint, input: &JointInput) -> Self {
+        let mut around = Around { begin: 0.0, tail: 0.0, direct: None, position: input.start.position };
+        if let Some(prefix) = prefix(joint, input) {
+            if input.interface == Interface::Position && begins_inside(joint, input.limits.velocity_min) {
+                let distance = input.target.position - around.position;
+                around.direct = Some(Direct { start: joint.start, distance, found: f64::NAN });
+            }
+            let mut scratch = Profile::EMPTY;
+            let mut writer = Writer::new(&mut scratch, &input.limits, around.position, f64::INFINITY);
+            writer.prefix(&prefix.steps);
+            (around.begin, around.position) = (writer.now(), writer.position);
+            joint.start = prefix.end;
+        }
+        if input.target_outside
+            && let Some(prefix) = prefix(&joint.reversed(), input)
+        {
+            let (suffix, end) = prefix.reversed();
+            let mut scratch = Profile::EMPTY;
+            let mut writer = Writer::new(&mut scratch, &input.limits, 0.0, f64::INFINITY);
+            writer.prefix(&suffix);
+            (around.tail, joint.end) = (writer.now(), end);
+            around.position += writer.position;
+            around.direct = None;
+        }
+        around
     }
 }
 

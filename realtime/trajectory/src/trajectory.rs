@@ -33,8 +33,15 @@ pub struct Trajectory<const N: usize> {
     duration: f64,
 }
 
+impl<const N: usize> Default for Trajectory<N> {
+    /// All joints at rest at zero: something to put a trajectory into.
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl<const N: usize> Trajectory<N> {
-    /// Nothing written yet.
+    /// Nothing written yet: every joint at rest at zero.
     pub(crate) const EMPTY: Self = Trajectory { profiles: [Profile::EMPTY; N], duration: 0.0 };
 
     /// The fastest motion from start to target in which the joints keep their limits and share
@@ -48,6 +55,23 @@ impl<const N: usize> Trajectory<N> {
     pub fn calculate(input: &Input<N>) -> Result<Self, Error> {
         let mut trajectory = Self::EMPTY;
         trajectory.fill(input).map(|()| trajectory)
+    }
+
+    /// As [`Trajectory::calculate`], into a trajectory that is there already, as a loop has one: a large thing is
+    /// then not moved. After an error it is that of
+    /// [`Trajectory::default`].
+    ///
+    /// # Errors
+    /// As [`Trajectory::calculate`].
+    ///
+    /// # Realtime
+    /// As [`Trajectory::calculate`].
+    pub fn recalculate(&mut self, input: &Input<N>) -> Result<(), Error> {
+        let filled = self.fill(input);
+        if filled.is_err() {
+            *self = Self::EMPTY;
+        }
+        filled
     }
 
     fn fill(&mut self, input: &Input<N>) -> Result<(), Error> {
@@ -134,7 +158,8 @@ impl<const N: usize> Plan<N> {
                 continue;
             }
             let own = input.joint(index);
-            self.tasks[index] = Some(Task::new(input::check(index, &own)?, &own));
+            let joint = input::check(index, &own)?;
+            Task::begin(&mut self.tasks[index], joint, &own);
             let target = &input.target[index];
             let rests = target.velocity == 0.0 && target.acceleration == 0.0;
             self.shared[index] = match input.synchronization[index] {
@@ -211,7 +236,7 @@ impl<const N: usize> Plan<N> {
         Ok(if any { duration } else { 0.0 })
     }
 
-    /// Writes the motion of each joint to a trajectory that has none yet.
+    /// Writes the motion of each joint.
     fn write(&mut self, input: &Input<N>, trajectory: &mut Trajectory<N>) -> Result<(), Error> {
         trajectory.duration = self.duration;
         let along = match &mut self.line {
@@ -279,7 +304,7 @@ impl<const N: usize> Input<N> {
                 *duration = {
                     let own = self.joint(index);
                     let joint = input::check(index, &own)?;
-                    first_possible(&mut Task::new(joint, &own), 0.0, index)?
+                    first_possible(Task::begin(&mut None, joint, &own), 0.0, index)?
                 };
             }
         }

@@ -69,6 +69,12 @@ impl<'a> Writer<'a> {
 
     /// Appends a motion that lasts from now to `end`, or a rounding less or more.
     pub(crate) fn follow(&mut self, phases: &[Phase]) {
+        self.follow_here(phases);
+    }
+
+    /// The same for phases whose number is known where this is called.
+    #[inline(always)]
+    pub(crate) fn follow_here(&mut self, phases: &[Phase]) {
         let alone = whole(&self.limits);
         let begin = self.now.time;
         let starts = starts(phases, begin, self.end - begin);

@@ -21,7 +21,8 @@ pub trait Contender {
 
 pub struct Tandem<const N: usize> {
     inputs: Vec<Input<N>>,
-    last: Option<Trajectory<N>>,
+    trajectory: Trajectory<N>,
+    solved: bool,
 }
 
 impl<const N: usize> Tandem<N> {
@@ -34,7 +35,8 @@ impl<const N: usize> Tandem<N> {
             interface,
             ..Input::default()
         };
-        Tandem { inputs: problems.iter().map(input).collect(), last: None }
+        let inputs: Vec<Input<N>> = problems.iter().map(input).collect();
+        Tandem { inputs, trajectory: Trajectory::default(), solved: false }
     }
 }
 
@@ -44,25 +46,23 @@ impl<const N: usize> Contender for Tandem<N> {
     }
 
     fn calculate(&mut self, index: usize) {
-        self.last = Trajectory::calculate(black_box(&self.inputs[index])).ok();
+        self.solved = self.trajectory.recalculate(black_box(&self.inputs[index])).is_ok();
     }
 
     fn duration(&self) -> Option<f64> {
-        self.last.as_ref().map(Trajectory::duration)
+        self.solved.then(|| self.trajectory.duration())
     }
 
     fn at_random(&mut self, times: &[f64]) {
-        let Some(trajectory) = &self.last else { return };
         for time in times {
-            black_box(&trajectory.at(*black_box(time)));
+            black_box(&self.trajectory.at(*black_box(time)));
         }
     }
 
     fn at_rising(&mut self, times: &[f64]) {
-        let Some(trajectory) = &self.last else { return };
         let mut cursor = Cursor::default();
         for time in times {
-            black_box(&cursor.at(trajectory, *black_box(time)));
+            black_box(&cursor.at(&self.trajectory, *black_box(time)));
         }
     }
 }

@@ -38,7 +38,8 @@ fn follow(problem: &Problem, cycle: f64, tolerance: f64, mut noise: impl FnMut()
 /// billion roundings make of hours.
 #[test]
 fn a_closed_loop_arrives_as_planned() {
-    for kind in [Kind::Benchmark, Kind::Decimals(1), Kind::Asymmetric, Kind::Outside, Kind::UnitLimits(2), Kind::Integers]
+    for kind in
+        [Kind::Benchmark, Kind::Decimals(1), Kind::Asymmetric, Kind::Outside, Kind::UnitLimits(2), Kind::Integers]
     {
         let mut source = Source::new(kind, 3);
         let (mut late, mut worst) = (0, 0.0_f64);
