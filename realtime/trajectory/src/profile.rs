@@ -208,25 +208,25 @@ impl Profile {
         self.state(index).advanced(time - self.times[index], self.jerk_at(index))
     }
 
-    /// The state at `time`, searched from segment `segment` on, which is moved to the one found.
+    /// The segment in which `time` lies: halvings without a branch, so that none is mispredicted.
+    #[inline]
+    fn search(&self, time: f64) -> usize {
+        let mut index = 0;
+        for step in [7, 4, 2, 1] {
+            index += step * usize::from(self.times[index + step] <= time);
+        }
+        index
+    }
+
+    /// The state at `time`, which is looked for first in `segment` and the next one; the one found is left there.
     #[inline]
     pub(crate) fn at_from(&self, time: f64, segment: &mut u8) -> State {
         let time = within_range(time);
-        let last = usize::from(*segment).min(SEGMENTS_MAX - 1);
-        let mut index = if self.times[last] > time { 0 } else { last };
-        // One step without a branch, as a loop's next time lies in this segment or the next: then none is
-        // mispredicted.
-        let step = |index: usize| {
-            let next = (index + 1).min(SEGMENTS_MAX - 1);
-            if self.times[next] <= time { next } else { index }
-        };
-        index = step(index);
-        loop {
-            let next = step(index);
-            if next == index {
-                break;
-            }
-            index = next;
+        let last = usize::from(*segment).min(SEGMENTS_MAX - 2);
+        let mut index = last + usize::from(self.times[last + 1] <= time);
+        let ended = self.times.get(index + 1).is_some_and(|next| *next <= time);
+        if ended || self.times[last] > time {
+            index = self.search(time);
         }
         *segment = index as u8;
         self.state_in(index, time)
@@ -237,11 +237,7 @@ impl Profile {
     #[inline]
     pub fn at(&self, time: f64) -> State {
         let time = within_range(time);
-        // The starts that have passed are the lowest bits of a number, which is found without a branch.
-        let starts = self.times[1..].iter().enumerate();
-        let bits = starts.fold(0_u32, |bits, (place, &start)| bits | u32::from(start <= time) << place);
-        let passed = bits.trailing_ones() as usize;
-        self.state_in(passed.min(SEGMENTS_MAX - 1), time)
+        self.state_in(self.search(time), time)
     }
 }
 

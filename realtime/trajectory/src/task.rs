@@ -7,7 +7,7 @@ use crate::{
     profile::Profile,
     reach::Reach,
     state::State,
-    swing::{Durations, Swing},
+    swing::{COLLECTED, Durations, Swing},
     writer::Writer,
 };
 
@@ -205,13 +205,14 @@ impl Around {
     }
 }
 
-/// Whether a start bound to leave the limits has not yet left them.
+/// Whether a start bound to leave the limits has not yet left them, up to collected roundings.
 fn begins_inside(joint: &Joint, velocity_min: f64) -> bool {
     let ([velocity, acceleration], [_, last]) = (joint.start, joint.end);
-    velocity <= joint.peak
-        && velocity >= velocity_min
-        && acceleration <= joint.top
-        && acceleration >= -joint.bottom
+    let within = |value: f64, limit: f64| value <= limit * (1.0 + COLLECTED);
+    within(velocity, joint.peak)
+        && within(-velocity, -velocity_min)
+        && within(acceleration, joint.top)
+        && within(-acceleration, joint.bottom)
         && acceleration * last > 0.0
 }
 

@@ -121,11 +121,7 @@ impl<const N: usize> Trajectory<N> {
     #[must_use]
     #[inline]
     pub fn at(&self, time: f64) -> [State; N] {
-        let mut states = [State::default(); N];
-        for (state, profile) in states.iter_mut().zip(&self.profiles) {
-            *state = profile.at(time);
-        }
-        states
+        core::array::from_fn(|joint| self.profiles[joint].at(time))
     }
 
     /// The motion of each joint.
