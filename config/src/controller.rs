@@ -8,6 +8,7 @@ use crate::timing::Timing;
 use core::time::Duration;
 use tandem_controller::{Params, SeparationParams, WALLS_MAX, Wall, Workspace};
 
+const LATE: Bound = bound("late_command_periods", "periods", 1.0, 100.0);
 const VALIDITY: Bound = bound("command_validity_ms", "ms", 2.0, 200.0);
 const ARM_AGE: Bound = bound("arm_age_max_ms", "ms", 0.25, 100.0);
 const HUMAN_AGE: Bound = bound("human_age_max_ms", "ms", 0.25, 500.0);
@@ -59,6 +60,7 @@ pub(crate) fn read(cell: &Table<'_>, timing: &Timing) -> Params {
         Duration::from_secs_f64(table.number_or(bound, absent.as_secs_f64() * 1e3) / 1e3)
     };
     let params = Params {
+        late_command_periods: number(&LATE, default.late_command_periods.into()) as u32,
         command_validity: time(&VALIDITY, default.command_validity),
         arm_age_max: time(&ARM_AGE, default.arm_age_max),
         human_age_max: time(&HUMAN_AGE, default.human_age_max),

@@ -7,6 +7,7 @@ use std::io::{BufRead as _, BufReader};
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::{Duration, Instant};
 
@@ -20,12 +21,16 @@ use tandem_msg::{Coded as _, Role};
 
 use super::BenchError;
 use super::series::histogram;
-use crate::live::{RunningCell, running_cells};
+use crate::live::{RunningCell, SPARE, running_cells};
 
 /// A cell that has not come so far by then has failed.
 const PATIENCE: Duration = Duration::from_secs(60);
 /// More boxes than any bench waits for.
 const BOXES: &str = "1000";
+/// Of perception and controller.
+const SPARES: usize = 2;
+/// Between two looks at the processes.
+const LOOK: Duration = Duration::from_millis(2);
 const JOINING: Duration = Duration::from_secs(5);
 
 /// A cell that runs.
@@ -48,13 +53,50 @@ pub(super) struct Scratch(PathBuf);
 
 impl Scratch {
     pub(super) fn new() -> Result<Self, BenchError> {
-        let folder = std::env::temp_dir().join(format!("tandem-bench-{}", std::process::id()));
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let folder = std::env::temp_dir().join(format!("tandem-bench-{}-{count}", std::process::id()));
         fs::create_dir_all(&folder).map_err(BenchError::io(folder.display().to_string()))?;
         Ok(Self(folder))
     }
 
     pub(super) fn path(&self) -> &Path {
         &self.0
+    }
+
+    /// A copy of a cell file in which the controller has another period; what lies beside the file is named by its
+    /// whole path.
+    ///
+    /// # Errors
+    /// The file cannot be read or the copy not be written.
+    pub(super) fn cell_at(&self, file: &Path, period: Duration) -> Result<PathBuf, BenchError> {
+        let failed = || BenchError::io(file.display().to_string());
+        let folder = file.canonicalize().map_err(failed())?;
+        let folder = folder.parent().unwrap_or(Path::new("/"));
+        let text = fs::read_to_string(file).map_err(failed())?;
+        let mut cell: toml::Table =
+            text.parse().map_err(|cause| BenchError::Refused(format!("{}: {cause}", file.display())))?;
+        cell.iter_mut().for_each(|(_, value)| name_wholly(value, folder));
+        let controller = cell.get_mut("timing").and_then(|timing| timing.get_mut(Role::Controller.name()));
+        if let Some(schedule) = controller.and_then(toml::Value::as_table_mut) {
+            let period = i64::try_from(period.as_micros()).unwrap_or(i64::MAX);
+            schedule.insert("period_us".to_owned(), period.into());
+        }
+        let copy = self.0.join(file.file_name().unwrap_or_default());
+        fs::write(&copy, cell.to_string()).map_err(BenchError::io(copy.display().to_string()))?;
+        Ok(copy)
+    }
+}
+
+/// Puts whole paths in the place of those that lead from `folder` to something.
+fn name_wholly(value: &mut toml::Value, folder: &Path) {
+    match value {
+        toml::Value::String(text) if text.contains('/') && folder.join(&*text).exists() => {
+            *text = folder.join(&*text).display().to_string();
+        }
+        toml::Value::Array(values) => values.iter_mut().for_each(|value| name_wholly(value, folder)),
+        toml::Value::Table(table) => table.iter_mut().for_each(|(_, value)| name_wholly(value, folder)),
+        _ => {}
     }
 }
 
@@ -103,6 +145,49 @@ impl LiveCell {
         Ok(Self { child, events, seat: Seat { running, config_hash: cell.hash }, _scratch: scratch })
     }
 
+    /// The supervisor's process.
+    pub(super) fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// Waits for an event of the cell.
+    ///
+    /// # Errors
+    /// It does not come, or the cell ends before.
+    pub(super) fn wait_for(&self, event: &str, wanted: impl Fn(&Value) -> bool) -> Result<(), BenchError> {
+        until(&self.events, event, |told| told["event"] == event && wanted(told)).map(drop)
+    }
+
+    /// Waits until every role that can be replaced has a spare that is ready.
+    ///
+    /// # Errors
+    /// They do not come up.
+    pub(super) fn wait_for_spares(&self) -> Result<(), BenchError> {
+        let deadline = Instant::now() + PATIENCE;
+        while spares(self.pid()) < SPARES {
+            if Instant::now() > deadline {
+                return Err(BenchError::peer("the live cell", format!("has no spares within {PATIENCE:?}")));
+            }
+            std::thread::sleep(LOOK);
+        }
+        Ok(())
+    }
+
+    /// Waits until it has ended by itself.
+    ///
+    /// # Errors
+    /// It does not end.
+    pub(super) fn wait_for_end(&mut self) -> Result<(), BenchError> {
+        let deadline = Instant::now() + PATIENCE;
+        while self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())).is_ok() {}
+        match self.child.try_wait() {
+            Ok(None) if Instant::now() > deadline => {
+                Err(BenchError::peer("the live cell", format!("has not ended within {PATIENCE:?}")))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Where it is found.
     pub(super) fn seat(&self) -> &Seat {
         &self.seat
@@ -135,6 +220,20 @@ impl Drop for LiveCell {
     fn drop(&mut self) {
         end(&mut self.child, &self.events);
     }
+}
+
+/// Processes of that parent which wait for their turn.
+fn spares(parent: u32) -> usize {
+    let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
+    let is_spare = |stat: String| {
+        let (name, rest) = stat.split_once('(')?.1.rsplit_once(')')?;
+        // State, then the parent.
+        let of = rest.split_whitespace().nth(1)?.parse::<u32>().ok()?;
+        Some(name == SPARE && of == parent)
+    };
+    // What is no process has no such file.
+    let stats = entries.filter_map(|entry| fs::read_to_string(entry.path().join("stat")).ok());
+    stats.filter_map(is_spare).filter(|is| *is).count()
 }
 
 /// A cell that is coming up; ended when it does not.

@@ -1,4 +1,4 @@
-//! How late a loop wakes: cyclictest, a bare loop, ours, in turns on one processor; then the
+//! How late a loop wakes: cyclictest, a bare loop, ours without and with a spin tail, in turns on one processor; then the
 //! controller of a live cell beside a bare loop in the same seconds; then that controller with a reader and without.
 
 use std::path::Path;
@@ -19,6 +19,9 @@ const LOOK: Duration = Duration::from_millis(10);
 const CYCLICTEST: &str = "cyclictest";
 const BARE: &str = "bare loop";
 const OURS: &str = "tandem's loop";
+const SPINNING: &str = "tandem's loop with its spin tail";
+/// Cycles until a spin tail is as long as was measured, and some.
+const CALIBRATED: u64 = 520;
 const CONTROLLER: &str = "controller of a live cell";
 const BESIDE: &str = "bare loop beside the cell";
 const READ: &str = "the same, read at 100 Hz";
@@ -38,8 +41,8 @@ pub(super) fn run(options: &Options, report: &mut Report) -> Result<(), BenchErr
 
 fn taking_turns(options: &Options, report: &mut Report) -> Result<(), BenchError> {
     let cpu = loops::processor(options.cpu);
-    let [mut peer, mut bare, mut ours] = [CYCLICTEST, BARE, OURS].map(Series::new);
-    let mut missed = 0;
+    let [mut peer, mut bare, mut ours, mut spinning] = [CYCLICTEST, BARE, OURS, SPINNING].map(Series::new);
+    let (mut missed, mut tails) = ([0; 2], Vec::new());
     let conditions = &mut report.conditions;
     for _ in 0..options.rounds {
         if let Some(round) = cyclictest::run(PERIOD, options.time, cpu)? {
@@ -50,20 +53,32 @@ fn taking_turns(options: &Options, report: &mut Report) -> Result<(), BenchError
             loops::bare(PERIOD, options.time, |late| lateness.saturating_record(late));
             lateness
         })?);
-        let (round, skipped) = loops::set_up(cpu, conditions, || loops::fixed_rate(loops::rate(PERIOD), options.time))?;
-        ours.add(round);
-        missed += skipped;
+        let kept = loops::set_up(cpu, conditions, || {
+            loops::fixed_rate(loops::rate(PERIOD, Duration::ZERO), options.time, loops::WARM_UP)
+        })?;
+        ours.add(kept.lateness);
+        // As long as it may be; how long it is, the loop measures.
+        let spun = loops::set_up(cpu, conditions, || {
+            loops::fixed_rate(loops::rate(PERIOD, PERIOD), options.time, CALIBRATED)
+        })?;
+        spinning.add(spun.lateness);
+        missed = [missed[0] + kept.missed, missed[1] + spun.missed];
+        tails.push(spun.tail.as_micros());
     }
     if peer.is_empty() {
         report.note(cyclictest::ABSENT);
     }
-    report.note(format!("grid points missed by tandem's loop: {missed}"));
+    report.note(format!(
+        "grid points missed by tandem's loop: {}, with its spin tail of {tails:?} µs: {}",
+        missed[0], missed[1]
+    ));
     let baseline = if peer.is_empty() { BARE } else { CYCLICTEST };
-    [peer, bare, ours].into_iter().for_each(|series| report.add(series));
+    [peer, bare, ours, spinning].into_iter().for_each(|series| report.add(series));
     if baseline == CYCLICTEST {
         report.compare(BARE, Some(baseline));
     }
     report.compare(OURS, Some(baseline));
+    report.compare(SPINNING, Some(baseline));
     Ok(())
 }
 

@@ -16,14 +16,11 @@ use tandem_kinematics::{JOINTS_MAX, LinkPoses};
 use tandem_msg::{Coded as _, Role, Stamp};
 use tandem_trajectory::{Generator, Input, Limits, State};
 
-use super::cell::Scratch;
+use super::rehearsal::{Rehearsal, Rests};
 use super::series::histogram;
 use super::{BenchError, Options, Report, Series, loops};
 use crate::learning::encoder::{Split, example};
-use crate::lockstep::SimCell;
 use crate::perception::{Perception, Sampler};
-use crate::strategy::store::{RunRecord, Store};
-use crate::supervisor::RunOptions;
 
 const FORWARD: &str = "forward kinematics";
 const CLEARANCE: &str = "clearance and separation";
@@ -35,9 +32,6 @@ const ENCODER: &str = "encoder, one cloud";
 const POSTURES: usize = 512;
 /// Calls that are timed together when one is near the clock's resolution.
 const BATCH: usize = 32;
-/// Working without a rest for longer, a realtime thread is taken for a runaway one.
-const BURST: Duration = Duration::from_millis(50);
-const REST: Duration = Duration::from_millis(6);
 /// Cell time that is run through in a round, for a second of measuring.
 const CELL_TIME: u64 = 40;
 const PERIOD: f64 = 1e-3;
@@ -87,17 +81,15 @@ pub(super) fn run(options: &Options, report: &mut Report) -> Result<(), BenchErr
 /// Calls `work` over and over for that long; a call counts as `batch` of what is measured.
 fn timed(time: Duration, batch: usize, mut work: impl FnMut(usize)) -> Histogram<u64> {
     let mut times = histogram();
-    let (mut spent, mut burst, mut turn) = (Duration::ZERO, Duration::ZERO, 0);
+    let (mut spent, mut turn) = (Duration::ZERO, 0);
+    let mut rests = Rests::begin();
     while spent < time {
         let before = loops::now();
         work(turn);
         let took = before.age_at(loops::now());
         times.saturating_record((took.as_nanos() as u64).div_ceil(batch as u64));
-        (spent, burst, turn) = (spent + took, burst + took, turn + 1);
-        if burst > BURST {
-            std::thread::sleep(REST);
-            burst = Duration::ZERO;
-        }
+        (spent, turn) = (spent + took, turn + 1);
+        rests.take();
     }
     times
 }
@@ -175,31 +167,14 @@ fn trajectories(cell: &Cell, postures: &[[f64; JOINTS_MAX]], time: Duration) -> 
 
 /// Every cycle of the controller, ports included, while a cell assembles in lockstep.
 fn cycles(file: &Path, cell: &Cell, time: Duration, seed: u64) -> Result<Histogram<u64>, BenchError> {
-    let refused = |error: &dyn std::fmt::Display| BenchError::Refused(format!("{}: {error}", file.display()));
-    let scratch = Scratch::new()?;
-    let store =
-        Store::open(&format!("sqlite://{}", scratch.path().join("kernels.db").display())).map_err(|e| refused(&e))?;
-    store.seed(&cell.strategies).map_err(|error| refused(&error))?;
-    let id = format!("bench-{}-{seed}", loops::now().0);
-    let record = RunRecord {
-        id: id.clone(),
-        cell: cell.name.clone(),
-        product: cell.product.name.clone(),
-        config_hash: cell.hash,
-        seed,
-        boxes: 1,
-        started_ns: 0,
-    };
-    store.begin(&record).map_err(|error| refused(&error))?;
-    let library = store.library().map_err(|error| refused(&error))?;
-    let mut sim =
-        SimCell::new(cell, library, RunOptions { boxes: 1, seed, run_id: id }).map_err(|error| refused(&error))?;
+    let rehearsal = Rehearsal::new(file, cell, 1, seed)?;
+    let mut sim = rehearsal.cell(cell, 1, seed)?;
     let mut times = histogram();
     let end = Stamp::default().after(time * CELL_TIME as u32);
-    let mut rested = loops::now();
+    let mut rests = Rests::begin();
     while sim.now() < end {
         let before = loops::now();
-        let outcome = sim.step(&store, &mut |_| {}).map_err(|error| refused(&error))?;
+        let outcome = sim.step(rehearsal.store(), &mut |_| {}).map_err(|error| rehearsal.refused(&error))?;
         let after = loops::now();
         if sim.role() == Role::Controller {
             times.saturating_record(after.0 - before.0);
@@ -207,10 +182,7 @@ fn cycles(file: &Path, cell: &Cell, time: Duration, seed: u64) -> Result<Histogr
         if outcome.is_some() {
             break;
         }
-        if rested.age_at(after) > BURST {
-            std::thread::sleep(REST);
-            rested = loops::now();
-        }
+        rests.take();
     }
     Ok(times)
 }

@@ -7,7 +7,7 @@ use hdrhistogram::Histogram;
 use rustix::thread::clock_nanosleep_absolute;
 use rustix::time::{ClockId, Timespec};
 use tandem_cycle::setup::{Granted, Policy, Wish, acquire};
-use tandem_cycle::{Clock as _, FixedRate, Grid, Monotonic};
+use tandem_cycle::{Clock as _, FixedRate, Grid, Monotonic, Pace, SharedRecord};
 use tandem_msg::Stamp;
 
 use super::series::histogram;
@@ -17,7 +17,7 @@ use super::{BenchError, Conditions};
 pub(super) const PRIORITY: u8 = 80;
 const NANOS: u64 = 1_000_000_000;
 /// Left out at the beginning: caches are cold.
-const WARM_UP: u64 = 20;
+pub(super) const WARM_UP: u64 = 20;
 
 /// What the measured threads ask for.
 pub(super) fn wish(cpu: Option<u32>) -> Wish {
@@ -79,26 +79,36 @@ pub(super) fn bare(period: Duration, time: Duration, mut late: impl FnMut(u64)) 
     }
 }
 
-/// Our loop around a cycle that does nothing. Lateness of each wake-up, and grid points missed.
-pub(super) fn fixed_rate(mut rate: FixedRate<Monotonic>, time: Duration) -> (Histogram<u64>, u64) {
+/// What a loop of ours showed.
+pub(super) struct Kept {
+    /// Lateness of each wake-up.
+    pub(super) lateness: Histogram<u64>,
+    /// Grid points missed.
+    pub(super) missed: u64,
+    /// How long it spun before each point in the end.
+    pub(super) tail: Duration,
+}
+
+/// Our loop around a cycle that does nothing.
+pub(super) fn fixed_rate(mut rate: FixedRate<Monotonic>, time: Duration, warm_up: u64) -> Kept {
     let mut lateness = histogram();
     let (mut missed, period) = (0, rate.grid().period());
     let cycles = (time.as_nanos() / period.as_nanos()) as u64;
-    for cycle in 0..cycles + WARM_UP {
+    for cycle in 0..cycles + warm_up {
         let tick = rate.wait();
-        if cycle >= WARM_UP {
+        if cycle >= warm_up {
             // Of the grid point it was to wake at, not of the last one it slept past.
             lateness.saturating_record(tick.woken.0 - tick.now.0 + tick.missed * period.as_nanos() as u64);
             missed += tick.missed;
         }
     }
-    (lateness, missed)
+    Kept { lateness, missed, tail: Duration::from_nanos(rate.record().spin_tail_ns) }
 }
 
-/// A loop at that period, on the grid.
-pub(super) fn rate(period: Duration) -> FixedRate<Monotonic> {
-    let grid = Grid::new(period, Duration::ZERO).expect("the command line allows only periods a grid can have");
-    FixedRate::new(grid, Monotonic)
+/// A loop at that period, on the grid, that spins at most so long before each point.
+pub(super) fn rate(period: Duration, spin_max: Duration) -> FixedRate<Monotonic> {
+    let grid = Grid::new(period, Duration::ZERO).expect("a period a grid can have");
+    FixedRate::recording_in(SharedRecord::default(), grid, Monotonic, Pace { spin_max, ..Pace::default() })
 }
 
 /// The time now.

@@ -5,6 +5,8 @@
 //! latency   a message and back; the cell's hops   beside raw shared memory, a futex, iceoryx2 itself
 //! recovery  kill -9: noticed, stopped, back  beside a bare pidfd, iceoryx2's own dead-node event and respawn
 //! kernels   what a control cycle computes    beside parry3d where the question is the same
+//! soak      a thousand kills of all roles    held to: nothing left, nothing grown
+//! endurance a million cycles                 held to: no number lost, nothing asked of the system, no slower
 //! ```
 //! **Rule:** a figure counts as a ratio to its baseline in the same run only. The cases take turns, round after round,
 //! so that what else the machine does meets all of them; a quantile is the median over the rounds of that round's quantile,
@@ -14,6 +16,7 @@
 mod cell;
 mod conditions;
 mod cyclictest;
+mod endurance;
 mod exchange;
 mod hops;
 mod jitter;
@@ -21,17 +24,20 @@ mod kernels;
 mod latency;
 mod loops;
 mod recovery;
+mod rehearsal;
 mod report;
 mod respawn;
 mod series;
+mod soak;
 
 use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
 
 pub use conditions::Conditions;
+pub use endurance::{Endurance, Shell};
 pub use exchange::peer;
-pub use report::{Report, Row};
+pub use report::{Finding, Report, Row};
 pub use series::{QUANTILES, Series};
 
 /// Which bench.
@@ -45,6 +51,13 @@ pub enum Bench {
     Recovery,
     /// What a control cycle computes.
     Kernels,
+    /// Whether kills leave something behind.
+    Soak {
+        /// How many.
+        kills: u32,
+    },
+    /// Whether a cell is at the end as it was at the beginning.
+    Endurance(Endurance),
 }
 
 impl Bench {
@@ -55,6 +68,8 @@ impl Bench {
             Self::Latency => "latency",
             Self::Recovery => "recovery",
             Self::Kernels => "kernels",
+            Self::Soak { .. } => "soak",
+            Self::Endurance(_) => "endurance",
         }
     }
 }
@@ -70,6 +85,8 @@ pub struct Options {
     pub cpu: Option<u32>,
     /// The cell that is run live; none leaves out what needs one.
     pub cell: Option<PathBuf>,
+    /// Is told how far a long one has come.
+    pub tell: fn(&str),
 }
 
 /// Why a bench could not be run.
@@ -124,6 +141,8 @@ pub fn run(bench: Bench, options: &Options) -> Result<Report, BenchError> {
         Bench::Latency => latency::run(options, &mut report)?,
         Bench::Recovery => recovery::run(options, &mut report)?,
         Bench::Kernels => kernels::run(options, &mut report)?,
+        Bench::Soak { kills } => soak::run(kills, options, &mut report)?,
+        Bench::Endurance(wanted) => endurance::run(wanted, options, &mut report)?,
     }
     report.end();
     Ok(report)

@@ -25,6 +25,26 @@ pub struct Row {
     pub ratio: Option<f64>,
 }
 
+/// A number that was counted, and what it is held to.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Finding {
+    /// What was counted.
+    pub what: String,
+    /// The number.
+    pub found: f64,
+    /// It may be as large as that; none = it is only told.
+    pub allowed: Option<f64>,
+    /// Of both.
+    pub unit: &'static str,
+}
+
+impl Finding {
+    /// Whether it is within what is allowed.
+    pub fn holds(&self) -> bool {
+        self.allowed.is_none_or(|allowed| self.found <= allowed)
+    }
+}
+
 /// What a bench found, and under what conditions.
 #[derive(Clone, Debug)]
 pub struct Report {
@@ -36,6 +56,8 @@ pub struct Report {
     pub series: Vec<Series>,
     /// Every comparison.
     pub rows: Vec<Row>,
+    /// Numbers that are held to something.
+    pub findings: Vec<Finding>,
     /// What else has to be known to read the figures: what is absent, missed cycles, and the like.
     pub notes: Vec<String>,
     ticks: Ticks,
@@ -48,6 +70,7 @@ impl Report {
             conditions: Conditions::now(),
             series: Vec::new(),
             rows: Vec::new(),
+            findings: Vec::new(),
             notes: Vec::new(),
             ticks: Ticks::now(),
         }
@@ -87,6 +110,15 @@ impl Report {
 
     pub(super) fn note(&mut self, note: impl Into<String>) {
         self.notes.push(note.into());
+    }
+
+    pub(super) fn finding(&mut self, what: impl Into<String>, found: f64, allowed: Option<f64>, unit: &'static str) {
+        self.findings.push(Finding { what: what.into(), found, allowed, unit });
+    }
+
+    /// Whether everything that is held to something is within it.
+    pub fn holds(&self) -> bool {
+        self.findings.iter().all(Finding::holds)
     }
 
     /// Adds a series; one in which nothing was measured is left out.

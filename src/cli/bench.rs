@@ -8,7 +8,7 @@ use comfy_table::{CellAlignment, Table, presets};
 use serde_json::json;
 
 use super::exit;
-use crate::bench::{self, Bench, BenchError, Options, QUANTILES, Report};
+use crate::bench::{self, Bench, BenchError, Endurance, Options, QUANTILES, Report, Shell};
 
 #[derive(Args)]
 pub(super) struct BenchArgs {
@@ -26,6 +26,45 @@ enum What {
     Recovery(Wanted),
     /// What a control cycle computes, part by part and as a whole
     Kernels(Wanted),
+    /// Kills all roles of live cells, many times; nothing may be left or have grown
+    Soak(SoakArgs),
+    /// Runs a cell for long; no number may be lost, nothing be asked of the system, nothing become slower
+    Endurance(EnduranceArgs),
+}
+
+#[derive(Args)]
+struct SoakArgs {
+    /// Kills in all
+    #[arg(long, default_value_t = 1_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    kills: u32,
+    #[command(flatten)]
+    long: Long,
+}
+
+#[derive(Args)]
+struct EnduranceArgs {
+    /// Cycles of the controller
+    #[arg(long, default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(100..=1_000_000_000))]
+    cycles: u64,
+    /// In one process on a virtual clock, as fast as it goes
+    #[arg(long)]
+    lockstep: bool,
+    /// Period of the controller instead of the cell file's, microseconds
+    #[arg(long, value_parser = clap::value_parser!(u32).range(250..=10_000))]
+    period_us: Option<u32>,
+    #[command(flatten)]
+    long: Long,
+}
+
+/// What the benches ask that run until they are done.
+#[derive(Args)]
+struct Long {
+    /// The cell
+    #[arg(long, value_name = "CELL.toml", default_value = "config/cells/s471.toml")]
+    cell: PathBuf,
+    /// Print one JSON object a line
+    #[arg(long)]
+    json: bool,
 }
 
 #[derive(Args)]
@@ -64,30 +103,53 @@ fn seconds(text: &str) -> Result<f64, String> {
 }
 
 pub(super) fn bench(args: &BenchArgs) -> u8 {
-    let (what, wanted) = match &args.what {
-        What::Jitter(wanted) => (Bench::Jitter, wanted),
-        What::Latency(wanted) => (Bench::Latency, wanted),
-        What::Recovery(wanted) => (Bench::Recovery, wanted),
-        What::Kernels(wanted) => (Bench::Kernels, wanted),
-    };
+    match &args.what {
+        What::Jitter(wanted) => taking_turns(Bench::Jitter, wanted),
+        What::Latency(wanted) => taking_turns(Bench::Latency, wanted),
+        What::Recovery(wanted) => taking_turns(Bench::Recovery, wanted),
+        What::Kernels(wanted) => taking_turns(Bench::Kernels, wanted),
+        What::Soak(wanted) => until_done(Bench::Soak { kills: wanted.kills }, &wanted.long),
+        What::Endurance(wanted) => {
+            let shell = if wanted.lockstep { Shell::Lockstep } else { Shell::Live };
+            let period = wanted.period_us.map(|us| Duration::from_micros(us.into()));
+            until_done(Bench::Endurance(Endurance { shell, cycles: wanted.cycles, period }), &wanted.long)
+        }
+    }
+}
+
+fn taking_turns(what: Bench, wanted: &Wanted) -> u8 {
     let options = Options {
         time: Duration::from_secs_f64(wanted.seconds),
         rounds: wanted.rounds,
         cpu: wanted.cpu,
         cell: (!wanted.no_cell).then(|| wanted.cell.clone()),
+        tell: |_| {},
     };
-    match bench::run(what, &options) {
+    measured(what, &options, wanted.json).map_or_else(|code| code, |report| keep(&report, wanted))
+}
+
+/// Fails when something that was counted is not within what it is held to.
+fn until_done(what: Bench, wanted: &Long) -> u8 {
+    let tell = |word: &str| anstream::eprintln!("{word}");
+    let options = Options { time: Duration::ZERO, rounds: 1, cpu: None, cell: Some(wanted.cell.clone()), tell };
+    measured(what, &options, wanted.json)
+        .map_or_else(|code| code, |report| if report.holds() { exit::OK } else { exit::FAILED })
+}
+
+/// Runs a bench and prints what it found; else says why it could not be run.
+fn measured(what: Bench, options: &Options, json: bool) -> Result<Report, u8> {
+    match bench::run(what, options) {
         Ok(report) => {
-            if wanted.json {
-                print_json(&report)
+            if json {
+                print_json(&report);
             } else {
-                print(&report)
+                print(&report);
             }
-            keep(&report, wanted)
+            Ok(report)
         }
         Err(error) => {
             anstream::eprintln!("{error}");
-            if matches!(error, BenchError::Config(_)) { exit::CONFIG } else { exit::FAILED }
+            Err(if matches!(error, BenchError::Config(_)) { exit::CONFIG } else { exit::FAILED })
         }
     }
 }
@@ -130,6 +192,13 @@ fn print_json(report: &Report) {
         }
         anstream::println!("{line}");
     }
+    for finding in &report.findings {
+        let mut line = serde_json::to_value(finding).unwrap_or_default();
+        line["event"] = json!("finding");
+        line["bench"] = json!(bench);
+        line["holds"] = json!(finding.holds());
+        anstream::println!("{line}");
+    }
     for row in &report.rows {
         anstream::println!("{}", serde_json::to_value(row).unwrap_or_default());
     }
@@ -152,7 +221,13 @@ fn print(report: &Report) {
         c.load[1],
         c.steal_share * 100.0
     );
-    anstream::println!("{}\n\n{}", distributions(report), comparisons(report));
+    let tables = [
+        (!report.series.is_empty()).then(|| distributions(report)),
+        (!report.rows.is_empty()).then(|| comparisons(report)),
+        (!report.findings.is_empty()).then(|| findings(report)),
+    ];
+    let tables: Vec<String> = tables.into_iter().flatten().map(|table| table.to_string()).collect();
+    anstream::println!("{}", tables.join("\n\n"));
     for note in &report.notes {
         anstream::println!("- {note}");
     }
@@ -188,6 +263,22 @@ fn comparisons(report: &Report) -> Table {
     for column in table.column_iter_mut().skip(2) {
         column.set_cell_alignment(CellAlignment::Right);
     }
+    table
+}
+
+/// Each number that was counted, and what it is held to.
+fn findings(report: &Report) -> Table {
+    let mut table = Table::new();
+    table.load_style(presets::NOTHING);
+    table.set_header([report.bench.name(), "found", "allowed", ""]);
+    for finding in &report.findings {
+        let number = |value: f64| if value.fract() == 0.0 { format!("{value:.0}") } else { format!("{value:.3}") };
+        let allowed = finding.allowed.map_or("-".to_owned(), |allowed| format!("{} {}", number(allowed), finding.unit));
+        let found = format!("{} {}", number(finding.found), finding.unit);
+        let word = if finding.holds() { "" } else { "EXCEEDED" };
+        table.add_row([finding.what.clone(), found, allowed, word.to_owned()]);
+    }
+    align(&mut table, 2);
     table
 }
 

@@ -1,18 +1,24 @@
 //! The main of a role's process.
+//!
+//! It reads its files, builds its role, opens its ports and sets itself up. Then it waits for its turn: a word on
+//! standard input, which comes at once, or, to a spare, when its predecessor has died. Until then it publishes nothing,
+//! so that nobody hears of it (`tandem_bus`).
 
 use std::error::Error;
+use std::io::{ErrorKind, Read as _};
 use std::path::PathBuf;
 use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
+use rustix::thread::set_name;
 use tandem_bus::{Identity, Instance, Node};
 use tandem_config::Cell;
-use tandem_controller::Controller;
-use tandem_msg::{Coded, Role};
+use tandem_msg::{Coded, Header, Role, Stamp};
 
-use super::shell::Shell;
+use super::shell::{self, Shell};
 use super::{LiveError, rundir, signals};
+use crate::lockstep::build_controller;
 use crate::perception::Perception;
 use crate::plant::Plant;
 use crate::roles::{ControllerRole, PerceptionRole, PlantRole};
@@ -21,6 +27,8 @@ use crate::roles::{ControllerRole, PerceptionRole, PlantRole};
 pub(super) const CHILDREN: [Role; 3] = [Role::Plant, Role::Perception, Role::Controller];
 /// How long a process tries to join the bus.
 pub(super) const JOINING: Duration = Duration::from_secs(5);
+/// What a process that waits for its turn is called in the host's lists.
+pub(crate) const SPARE: &str = "spare";
 
 /// What a role's process is started with.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -77,14 +85,11 @@ fn plant(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), LiveEr
             }
         });
         opened.recv().unwrap_or(Ok(()))?;
-        let shell = Shell::new(cell, instance, args.role, args.epoch)?;
-        let left = shell.run(|now| {
+        // What the closure owns goes with it, and so the camera ends.
+        turn(args, cell, instance, move |now| {
             role.cycle(now);
             role.heard()
-        });
-        // Ends the camera.
-        drop(role);
-        left
+        })
     })
 }
 
@@ -92,23 +97,52 @@ fn perception(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), L
     let perception = Perception::load(&cell.perception.model).map_err(refused(Role::Perception))?;
     let node = join(args.role, args.epoch, cell, instance);
     let mut role = PerceptionRole::open(&node, perception)?;
-    let shell = Shell::new(cell, instance, args.role, args.epoch)?;
-    shell.run(|now| {
+    turn(args, cell, instance, move |now| {
         role.cycle(now);
         role.heard()
     })
 }
 
 fn controller(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), LiveError> {
-    let controller = Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller);
-    let controller = controller.map_err(refused(Role::Controller))?;
+    let controller = build_controller(cell).map_err(refused(Role::Controller))?;
     let node = join(args.role, args.epoch, cell, instance);
     let mut role = ControllerRole::open(&node, controller)?;
-    let shell = Shell::new(cell, instance, args.role, args.epoch)?;
-    shell.run(|now| {
+    turn(args, cell, instance, move |now| {
         role.cycle(now);
         role.heard()
     })
+}
+
+/// Sets the calling thread up, waits for the turn of this process and runs the loop until it is asked to end.
+fn turn<const N: usize>(
+    args: &RoleArgs,
+    cell: &Cell,
+    instance: &Instance,
+    cycle: impl FnMut(Stamp) -> [Header; N],
+) -> Result<(), LiveError> {
+    let granted = shell::set_up(cell, args.role)?;
+    if !has_come(args.role) {
+        return Ok(());
+    }
+    Shell::new(cell, instance, args.role, args.epoch, &granted)?.run(cycle)
+}
+
+/// Waits for the turn of this process; it never comes when standard input ends.
+fn has_come(role: Role) -> bool {
+    let call = |name: &str| {
+        // A name in lists; nothing depends on it.
+        let _ = std::ffi::CString::new(name).map(|name| set_name(&name));
+    };
+    call(SPARE);
+    let mut word = [0];
+    let come = loop {
+        match std::io::stdin().read(&mut word) {
+            Err(cause) if cause.kind() == ErrorKind::Interrupted => {}
+            read => break read.is_ok_and(|count| count > 0),
+        }
+    };
+    call(role.name());
+    come
 }
 
 /// A place on the bus for one incarnation of a role.

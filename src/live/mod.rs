@@ -4,8 +4,9 @@
 //! tandem run ─┬─ main thread         prints what happens
 //!             ├─ supervisor thread   100 Hz: health, the supervisor role      (supervise)
 //!             ├─ journal thread      the store; no cycle waits for it         (journal)
-//!             ├─ warden thread       starts, watches, restarts processes      (warden, spawn)
-//!             └─ tandem role plant | perception | controller                  (child, shell)
+//!             ├─ warden thread       starts, watches, replaces processes      (warden, spawn)
+//!             ├─ tandem role plant | perception | controller                  (child, shell)
+//!             └─ the same, spare: perception and controller that wait for their turn
 //! ```
 //! The parent starts this same binary again for each role. What a process is
 //! called, where the bus lies and which incarnation it is stands on its command
@@ -33,10 +34,11 @@ mod statistics;
 mod supervise;
 mod warden;
 
+pub(crate) use child::SPARE;
 pub use child::{RoleArgs, role};
 pub use error::LiveError;
-pub(crate) use rundir::prepare_base;
 pub use rundir::{base, dead_cells};
+pub(crate) use rundir::{prepare_base, sweep};
 pub use statistics::{RunningCell, running_cells};
 pub use supervise::Ended;
 
@@ -44,6 +46,7 @@ use std::sync::mpsc;
 use std::thread;
 
 use tandem_config::Cell;
+use tandem_msg::Role;
 
 use crate::strategy::Library;
 use crate::strategy::store::Store;
@@ -100,7 +103,10 @@ pub fn run(
             let watch = Watch { cell, instance, reports, orders: &orders, journal, events };
             watch.run(supervisor)
         });
-        let warding = scope.spawn(move || warden.run());
+        let warding = scope.spawn(move || {
+            shell::prefer(cell, Role::Supervisor);
+            warden.run();
+        });
         // Ends when the supervisor's thread has, and with it the sender.
         told.iter().for_each(|event| on_event(&event));
         let ended = supervising.join();

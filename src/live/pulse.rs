@@ -12,9 +12,12 @@ use std::time::{Duration, Instant};
 
 use tandem_cycle::stats::Reader;
 
-/// Silence after which a loop is looked into, and after which it is judged, in periods.
+/// Silence after which a loop is looked into, in periods.
 const SUSPECT: u32 = 3;
-const JUDGE: u32 = 8;
+/// After which one that is stopped is judged: it was at both looks.
+const JUDGE_STOPPED: u32 = 6;
+/// After which one that runs is: it needs time to use up.
+const JUDGE_RUNNING: u32 = 8;
 /// Processor time a loop must have used in between to be taken for spinning, in periods.
 const SPUN: u32 = 4;
 
@@ -68,10 +71,12 @@ impl Pulse {
                 self.suspected = look();
                 false
             }
-            Some(before) if silent >= self.period * JUDGE => look().is_some_and(|after| match after.doing {
+            Some(before) if silent >= self.period * JUDGE_STOPPED => look().is_some_and(|after| match after.doing {
                 Doing::Stopped => before.doing == Doing::Stopped,
                 Doing::Running => {
-                    after.used.saturating_sub(before.used) >= self.period * SPUN && after.stolen == before.stolen
+                    silent >= self.period * JUDGE_RUNNING
+                        && after.used.saturating_sub(before.used) >= self.period * SPUN
+                        && after.stolen == before.stolen
                 }
                 Doing::Waiting => false,
             }),
@@ -115,8 +120,8 @@ mod tests {
 
     #[test]
     fn a_stopped_or_spinning_loop_is_lost_within_ten_periods() {
-        assert_eq!(judged_after(|_| at(Doing::Stopped, 0, 0)), Some(JUDGE));
-        assert_eq!(judged_after(|ms| at(Doing::Running, ms, 0)), Some(JUDGE));
+        assert_eq!(judged_after(|_| at(Doing::Stopped, 0, 0)), Some(JUDGE_STOPPED));
+        assert_eq!(judged_after(|ms| at(Doing::Running, ms, 0)), Some(JUDGE_RUNNING));
     }
 
     #[test]

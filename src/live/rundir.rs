@@ -94,7 +94,7 @@ fn named() -> Vec<PathBuf> {
 }
 
 /// Removes what dead cells of this user left. What cannot be removed is left to `tandem doctor`.
-pub(super) fn sweep() {
+pub(crate) fn sweep() {
     for path in dead_cells() {
         if let Ok(instance) = instance_at(&path) {
             let _ = remove(&path, &instance);

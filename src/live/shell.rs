@@ -26,17 +26,21 @@ pub(super) struct Shell {
 }
 
 impl Shell {
-    /// Sets the calling thread up as the cell file asks; says on standard error what the host does not grant.
-    pub(super) fn new(cell: &Cell, instance: &Instance, role: Role, epoch: u64) -> Result<Self, LiveError> {
+    /// The loop of a thread that was set up ([`set_up`]); begins its statistics.
+    pub(super) fn new(
+        cell: &Cell,
+        instance: &Instance,
+        role: Role,
+        epoch: u64,
+        granted: &Granted,
+    ) -> Result<Self, LiveError> {
         let schedule = cell.timing.of(role);
         let grid = Grid::new(schedule.period, schedule.phase).map_err(|cause| LiveError::Schedule { role, cause })?;
-        let granted = granted(cell, role)?;
-        tell(role, &granted);
         let path = statistics::file(instance, role);
         let now = Monotonic.now();
-        let record = Writer::create(&path, role, epoch, &grid, service::inputs(role), &granted, now);
+        let record = Writer::create(&path, role, epoch, &grid, service::inputs(role), granted, now);
         let record = record.map_err(|cause| LiveError::Statistics { path, cause })?;
-        let pace = Pace { overrun: overrun(schedule.overrun), spin_max: spin_max(cell, role, &granted) };
+        let pace = Pace { overrun: overrun(schedule.overrun), spin_max: spin_max(cell, role, granted) };
         Ok(Self { role, rate: FixedRate::recording_in(record, grid, Monotonic, pace), watch: Watch::default() })
     }
 
@@ -88,11 +92,25 @@ fn spin_max(cell: &Cell, role: Role, granted: &Granted) -> Duration {
     if allowed { cell.realtime.spin_max[role as usize] } else { Duration::ZERO }
 }
 
-/// What the host grants the calling thread for its role.
-fn granted(cell: &Cell, role: Role) -> Result<Granted, LiveError> {
+/// Sets the calling thread up as the cell file asks for that role; says on standard error what the host does not grant.
+pub(super) fn set_up(cell: &Cell, role: Role) -> Result<Granted, LiveError> {
+    let granted = setup::acquire(&wish(cell, role)).map_err(|denied| LiveError::Denied { role, denied })?;
+    tell(role, &granted);
+    Ok(granted)
+}
+
+/// Lets the calling thread run ahead of ordinary ones at the priority of that role, as far as the host grants it.
+/// What is missing is told by the role itself.
+pub(super) fn prefer(cell: &Cell, role: Role) {
+    let policy = setup::Policy::BestEffort;
+    let priority = cell.realtime.priority[role as usize];
+    let _ = setup::acquire(&Wish { policy, priority, cpu: None, lock_memory: false, dma_latency_us: None });
+}
+
+fn wish(cell: &Cell, role: Role) -> Wish {
     let index = role as usize;
     let priority = cell.realtime.priority[index];
-    let wish = Wish {
+    Wish {
         policy: match cell.realtime.policy {
             Policy::Enforce => setup::Policy::Enforce,
             Policy::BestEffort => setup::Policy::BestEffort,
@@ -102,8 +120,7 @@ fn granted(cell: &Cell, role: Role) -> Result<Granted, LiveError> {
         // The supervisor shares its process with the store and the console, which may take their time.
         lock_memory: priority.is_some() && role != Role::Supervisor,
         dma_latency_us: priority.and(cell.realtime.dma_latency_us),
-    };
-    setup::acquire(&wish).map_err(|denied| LiveError::Denied { role, denied })
+    }
 }
 
 /// Says on standard error what is degraded, and how to mend it.

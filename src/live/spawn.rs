@@ -72,7 +72,7 @@ impl LastWords {
     }
 }
 
-/// Starts the process of a role. It is killed by the kernel when the calling
+/// Starts the process of a role, which waits for its turn: a byte on its standard input. It is killed by the kernel when the calling
 /// *thread* ends; the terminal's Ctrl-C does not reach it; it inherits no file.
 pub(super) fn spawn(plan: &Plan, role: Role, epoch: u64) -> io::Result<(Child, LastWords)> {
     let mut command = Command::new(SELF);
@@ -84,7 +84,7 @@ pub(super) fn spawn(plan: &Plan, role: Role, epoch: u64) -> io::Result<(Child, L
     command.args(["--epoch", &epoch.to_string(), "--seed", &plan.seed.to_string()]);
     // A pool of threads would only take the loops' processors from them.
     command.env("RAYON_NUM_THREADS", "1");
-    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped()).process_group(0);
+    command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).process_group(0);
     let parent = std::process::id();
     // SAFETY: between fork and exec only system calls are made, on plain numbers.
     unsafe { command.pre_exec(move || leash(parent)) };

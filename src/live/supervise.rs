@@ -11,7 +11,7 @@ use tandem_msg::{Coded, Role, Stamp};
 use super::child::join;
 use super::journal::Journal;
 use super::rollcall::RollCall;
-use super::shell::Shell;
+use super::shell::{self, Shell};
 use super::warden::{Orders, Report};
 use super::{LiveError, signals, statistics};
 use crate::roles::{SupervisorRole, Surroundings};
@@ -64,7 +64,8 @@ impl Watch<'_> {
         let node = join(Role::Supervisor, 1, self.cell, self.instance);
         let mut role = SupervisorRole::open(&node, supervisor)?;
         let mut roles = RollCall::new(self.cell);
-        let mut shell = Shell::new(self.cell, self.instance, Role::Supervisor, 1)?;
+        let granted = shell::set_up(self.cell, Role::Supervisor)?;
+        let mut shell = Shell::new(self.cell, self.instance, Role::Supervisor, 1, &granted)?;
         let mut asked_since = None;
         let mut ending: Option<Ending> = None;
         loop {

@@ -1,10 +1,17 @@
-//! Starts the role processes, sees them end, and starts them anew.
+//! Starts the role processes, sees them end, and has others take their places.
 //!
 //! One thread, which waits on a pidfd of every child, so that a death is noticed
 //! when it happens and never in the supervisor's cycle. Between deaths it takes the
 //! pulse of the realtime loops: one that is stopped or spins without a cycle is
-//! killed within ten of its periods. The successor is started before the dead one's
-//! place on the bus is cleaned up: there is room for both.
+//! killed within ten of its periods.
+//!
+//! ```text
+//! spawned ──reads, builds, connects──▶ spare ──its turn──▶ running ──▶ dead
+//!                                        ▲                              │ the spare's turn comes at once;
+//!                                        └───────── another one ◀───────┘ then the dead one's place is cleaned up
+//! ```
+//! What takes a new process its time has been done when it is needed; one whose turn
+//! comes before that goes on as soon as it can. The bus has room for a process and its spare.
 //!
 //! **Invariant:** a role process never outlives this thread: the kernel kills it
 //! when the thread that started it ends (`PR_SET_PDEATHSIG`), whatever the reason.
@@ -12,9 +19,10 @@
 //! longer pause. The plant is not restarted: it stands for hardware, whose state
 //! a new process would not have.
 
+use std::io::Write as _;
 use std::os::fd::{AsFd, OwnedFd};
 use std::os::unix::process::ExitStatusExt;
-use std::process::{Child, ExitStatus};
+use std::process::{Child, ChildStdin, ExitStatus};
 use std::sync::{Arc, mpsc};
 use std::time::{Duration, Instant};
 
@@ -34,6 +42,8 @@ use super::statistics;
 const RESTARTS_MAX: u32 = 5;
 /// Pause before the second restart in a row; doubled for each further one. The first is immediate.
 const PAUSE: Duration = Duration::from_millis(100);
+/// From a turn until the next spare is started: the processors are not taken from who has just begun.
+const SPARE_AFTER: Duration = Duration::from_millis(200);
 /// A process that has lived this long starts the count anew.
 const HEALTHY: Duration = Duration::from_secs(30);
 /// How long another cleaner on the bus is waited for.
@@ -102,20 +112,29 @@ impl Orders {
     }
 }
 
-/// One role's process, or its successor to be.
+/// One role's process, and its successor.
 struct Place {
     role: Role,
     running: Option<Running>,
+    /// Waits for its turn.
+    spare: Option<Running>,
+    /// Of the process started last.
     epoch: u64,
     /// Restarts in a row.
     restarts: u32,
+    /// Spares that ended before their turn.
+    spares_lost: u32,
     start_at: Option<Instant>,
+    spare_at: Option<Instant>,
     /// Period of its loop, when it is realtime.
     beat: Option<Duration>,
 }
 
 struct Running {
     child: Child,
+    epoch: u64,
+    /// Where its turn is told; it ends when this is closed before.
+    turn: Option<ChildStdin>,
     pidfd: OwnedFd,
     words: LastWords,
     since: Instant,
@@ -149,7 +168,8 @@ impl Warden {
         let (sender, orders) = mpsc::channel();
         let place = |(role, beat)| {
             let start_at = Some(Instant::now());
-            Place { role, running: None, epoch: 0, restarts: 0, start_at, beat }
+            let (running, spare, spare_at) = (None, None, None);
+            Place { role, running, spare, epoch: 0, restarts: 0, spares_lost: 0, start_at, spare_at, beat }
         };
         let mut beats = plan.beats.into_iter();
         let places = CHILDREN.map(|role| place((role, beats.next().flatten())));
@@ -166,11 +186,11 @@ impl Warden {
             self.reap();
             self.take_pulses();
             if let Some(patience_ends) = self.ending {
-                if self.places.iter().all(|place| place.running.is_none()) {
+                if self.places.iter().all(|place| place.processes().next().is_none()) {
                     return;
                 }
                 if Instant::now() >= patience_ends {
-                    self.places.iter().for_each(|place| place.signal(Signal::KILL));
+                    self.places.iter().flat_map(Place::processes).for_each(|process| process.signal(Signal::KILL));
                 }
             }
         }
@@ -178,20 +198,26 @@ impl Warden {
 
     fn start_due(&mut self) {
         let now = Instant::now();
-        for place in self.places.iter_mut().filter(|place| place.start_at.is_some_and(|at| at <= now)) {
-            place.start_at = None;
-            place.epoch += 1;
-            let role = place.role;
-            match spawn(&self.plan, role, place.epoch).and_then(|(child, words)| Running::new(child, words, place.beat))
-            {
-                Ok(running) => {
-                    place.running = Some(running);
-                    let _ = self.reports.send(Report::Started { role, epoch: place.epoch });
+        let due = |at: Option<Instant>| at.is_some_and(|at| at <= now);
+        for place in &mut self.places {
+            if due(place.start_at) {
+                match place.replace(&self.plan) {
+                    Ok(epoch) => self.reports.send(Report::Started { role: place.role, epoch }),
+                    Err(cause) => {
+                        let role = place.role;
+                        let last_words = format!("its process could not be started: {cause}");
+                        let _ = self.reports.send(Report::Lost { role, loss: Loss::NeverReady, last_words });
+                        self.reports.send(Report::GivenUp { role })
+                    }
                 }
-                Err(cause) => {
-                    let last_words = format!("its process could not be started: {cause}");
-                    let _ = self.reports.send(Report::Lost { role, loss: Loss::NeverReady, last_words });
-                    let _ = self.reports.send(Report::GivenUp { role });
+                // Without a supervisor nobody needs to know.
+                .unwrap_or_default();
+            }
+            if due(place.spare_at) {
+                place.spare_at = None;
+                match place.spawn(&self.plan) {
+                    Ok(spare) => place.spare = Some(spare),
+                    Err(_) => place.spare_lost(),
                 }
             }
         }
@@ -202,14 +228,15 @@ impl Warden {
         let beating =
             self.places.iter().any(|place| place.running.as_ref().is_some_and(|running| running.pulse.is_some()));
         let beat = beating.then(|| Instant::now() + BEAT);
-        let due = self.places.iter().filter_map(|place| place.start_at).chain(self.ending).chain(beat).min();
+        let starts = self.places.iter().flat_map(|place| [place.start_at, place.spare_at]).flatten();
+        let due = starts.chain(self.ending).chain(beat).min();
         // Once patience has ended the killed are waited for, without spinning.
         let left = due.map(|at| at.saturating_duration_since(Instant::now()).max(Duration::from_millis(1)));
         let timeout =
             left.map(|left| Timespec { tv_sec: left.as_secs() as i64, tv_nsec: i64::from(left.subsec_nanos()) });
         let mut fds = vec![PollFd::from_borrowed_fd(self.wake.as_fd(), PollFlags::IN)];
-        let running = self.places.iter().filter_map(|place| place.running.as_ref());
-        fds.extend(running.map(|running| PollFd::from_borrowed_fd(running.pidfd.as_fd(), PollFlags::IN)));
+        let processes = self.places.iter().flat_map(Place::processes);
+        fds.extend(processes.map(|running| PollFd::from_borrowed_fd(running.pidfd.as_fd(), PollFlags::IN)));
         // Interrupted or not, everything is looked at again.
         let _ = poll(&mut fds, timeout.as_ref());
         let _ = rustix::io::read(&*self.wake, &mut [0_u8; 8]);
@@ -224,7 +251,9 @@ impl Warden {
                 Order::Shutdown if self.ending.is_none() => {
                     self.ending = Some(Instant::now() + GRACE);
                     for place in &mut self.places {
-                        place.start_at = None;
+                        (place.start_at, place.spare_at) = (None, None);
+                        // A spare ends when its turn can not come any more.
+                        place.spare.iter_mut().for_each(|spare| spare.turn = None);
                         place.signal(Signal::TERM);
                         // One that was stopped could not obey.
                         place.signal(Signal::CONT);
@@ -248,7 +277,7 @@ impl Warden {
                 running.statistics = Reader::open(&statistics::file(&self.instance, place.role)).ok();
             }
             let Some(statistics) = &running.statistics else { continue };
-            if !running.silent && pulse.is_lost(statistics, place.epoch, running.child.id(), now) {
+            if !running.silent && pulse.is_lost(statistics, running.epoch, running.child.id(), now) {
                 running.silent = true;
                 place.signal(Signal::KILL);
             }
@@ -256,23 +285,42 @@ impl Warden {
     }
 
     fn reap(&mut self) {
-        for index in 0..self.places.len() {
-            let Some((status, dead)) = self.places[index].take_ended() else { continue };
-            let role = self.places[index].role;
+        let mut ended = false;
+        for place in &mut self.places {
+            if take_ended(&mut place.spare).is_some() && self.ending.is_none() {
+                place.spare_lost();
+                ended = true;
+            }
+            let Some((status, dead)) = take_ended(&mut place.running) else { continue };
+            ended = true;
             if self.ending.is_some() {
                 continue;
             }
+            if dead.since.elapsed() >= HEALTHY {
+                place.restarts = 0;
+            }
             let loss = if dead.silent { Loss::Silent } else { loss_of(status) };
-            let _ = self.reports.send(Report::Lost { role, loss, last_words: dead.words.read() });
-            let place = &mut self.places[index];
             // A file or setting that was refused will be refused again.
             let refused = loss == Loss::Exited { code: CONFIG_REFUSED };
-            if role == Role::Plant || refused || place.restarts >= RESTARTS_MAX {
-                let _ = self.reports.send(Report::GivenUp { role });
+            let role = place.role;
+            let given_up = role == Role::Plant || refused || place.restarts >= RESTARTS_MAX;
+            // The successor first; what there is to tell is told after.
+            let started = if given_up {
+                None
             } else {
                 place.start_at = Some(Instant::now() + pause(place.restarts));
                 place.restarts += 1;
+                if place.restarts == 1 && place.spare.is_some() { place.replace(&self.plan).ok() } else { None }
+            };
+            let _ = self.reports.send(Report::Lost { role, loss, last_words: dead.words.read() });
+            if let Some(epoch) = started {
+                let _ = self.reports.send(Report::Started { role, epoch });
             }
+            if given_up {
+                let _ = self.reports.send(Report::GivenUp { role });
+            }
+        }
+        if ended && self.ending.is_none() {
             self.start_due();
             self.instance.clean_dead(CLEANING);
         }
@@ -280,33 +328,67 @@ impl Warden {
 }
 
 impl Place {
-    fn signal(&self, signal: Signal) {
-        if let Some(running) = &self.running {
-            // It may have ended in the meantime.
-            let _ = pidfd_send_signal(&running.pidfd, signal);
-        }
+    /// Its processes: the one that runs and the spare.
+    fn processes(&self) -> impl Iterator<Item = &Running> {
+        self.running.iter().chain(&self.spare)
     }
 
-    /// The process, if it has ended.
-    fn take_ended(&mut self) -> Option<(ExitStatus, Running)> {
-        let running = self.running.as_mut()?;
-        let status = running.child.try_wait().ok().flatten()?;
-        let running = self.running.take()?;
-        if running.since.elapsed() >= HEALTHY {
-            self.restarts = 0;
+    fn signal(&self, signal: Signal) {
+        self.running.iter().for_each(|process| process.signal(signal));
+    }
+
+    /// The turn of the spare, or, without one, of a process that is started now. Its incarnation.
+    fn replace(&mut self, plan: &Plan) -> std::io::Result<u64> {
+        self.start_at = None;
+        let mut next = match self.spare.take() {
+            Some(spare) => spare,
+            None => self.spawn(plan)?,
+        };
+        if let Some(mut turn) = next.turn.take() {
+            // One that has just ended is found to have.
+            let _ = turn.write_all(&[1]);
         }
-        Some((status, running))
+        next.since = Instant::now();
+        let epoch = next.epoch;
+        self.running = Some(next);
+        // The plant is not replaced.
+        self.spare_at = (self.role != Role::Plant).then(|| Instant::now() + SPARE_AFTER);
+        Ok(epoch)
+    }
+
+    fn spawn(&mut self, plan: &Plan) -> std::io::Result<Running> {
+        self.epoch += 1;
+        let (child, words) = spawn(plan, self.role, self.epoch)?;
+        Running::new(child, self.epoch, words, self.beat)
+    }
+
+    /// A spare ended before its turn, or could not be started: another one, unless too many have.
+    fn spare_lost(&mut self) {
+        self.spares_lost += 1;
+        self.spare_at = (self.spares_lost <= RESTARTS_MAX).then(|| Instant::now() + pause(self.spares_lost));
     }
 }
 
+/// The process of that place, if it has ended.
+fn take_ended(place: &mut Option<Running>) -> Option<(ExitStatus, Running)> {
+    let status = place.as_mut()?.child.try_wait().ok().flatten()?;
+    Some((status, place.take()?))
+}
+
 impl Running {
-    fn new(mut child: Child, words: LastWords, beat: Option<Duration>) -> std::io::Result<Self> {
+    fn signal(&self, signal: Signal) {
+        // It may have ended in the meantime.
+        let _ = pidfd_send_signal(&self.pidfd, signal);
+    }
+
+    fn new(mut child: Child, epoch: u64, words: LastWords, beat: Option<Duration>) -> std::io::Result<Self> {
+        let turn = child.stdin.take();
         let pid = Pid::from_child(&child);
         match pidfd_open(pid, PidfdFlags::empty()) {
             Ok(pidfd) => {
                 let since = Instant::now();
                 let pulse = beat.map(|period| Pulse::new(period, since));
-                Ok(Self { child, pidfd, words, since, statistics: None, pulse, silent: false })
+                Ok(Self { child, epoch, turn, pidfd, words, since, statistics: None, pulse, silent: false })
             }
             Err(cause) => {
                 child.kill()?;

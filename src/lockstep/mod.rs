@@ -13,14 +13,14 @@ use std::convert::Infallible;
 use std::fmt;
 use std::time::Duration;
 
-use tandem_bus::Identity;
+use tandem_bus::{Identity, SlotReader};
 use tandem_config::Cell;
-use tandem_controller::Controller;
-use tandem_msg::{Coded, MotionStatus, Role, Stamp};
+use tandem_controller::{Controller, ParamsError};
+use tandem_msg::{Coded, Message, MotionStatus, Role, Stamp};
 
 use crate::perception::Perception;
 use crate::plant::Plant;
-use crate::roles::{ControllerRole, MemoryPorts, PerceptionRole, PlantRole, SupervisorRole, Surroundings};
+use crate::roles::{ControllerRole, MemoryPorts, PerceptionRole, PlantRole, Ports as _, SupervisorRole, Surroundings};
 use crate::strategy::Library;
 use crate::strategy::store::Store;
 use crate::supervisor::{Event, Outcome, RoleFault, RoleHealth, RunOptions, Summary, Supervisor};
@@ -87,7 +87,7 @@ impl SimCell {
         let seen_by = |role| ports.seen_by(identity(role, 1, cell.hash));
         let plant = Plant::new(cell, options.seed).map_err(|e| failed("plant", &e))?;
         let perception = Perception::load(&cell.perception.model).map_err(|e| failed("perception", &e))?;
-        let controller = build_controller(cell)?;
+        let controller = build_controller(cell).map_err(|e| failed("controller", &e))?;
         let boxes = options.boxes;
         let supervisor = Supervisor::new(cell, library, options);
         Ok(Self {
@@ -131,6 +131,11 @@ impl SimCell {
     /// The numbers of the run so far.
     pub fn summary(&self) -> Summary {
         self.supervisor.summary()
+    }
+
+    /// The latest value of a service, as every role could read it.
+    pub fn listen<M: Message>(&self, service: &str) -> SlotReader<M> {
+        opened(self.ports.reader(service))
     }
 
     /// Runs until `until` says so (`None`), or the supervisor ends the run. Events go to
@@ -213,7 +218,8 @@ impl SimCell {
         let ports = self.ports.seen_by(identity(role, self.epochs[index], self.cell.hash));
         match role {
             Role::Controller => {
-                self.controller = opened(ControllerRole::open(&ports, build_controller(&self.cell)?));
+                let controller = build_controller(&self.cell).map_err(|e| SimError::of("controller", &e))?;
+                self.controller = opened(ControllerRole::open(&ports, controller));
             }
             Role::Perception => {
                 let perception = Perception::load(&self.cell.perception.model)
@@ -230,9 +236,8 @@ impl SimCell {
 ///
 /// # Errors
 /// Parameters it refuses.
-pub fn build_controller(cell: &Cell) -> Result<Controller, SimError> {
-    let refused = |error| SimError(format!("controller: {error}"));
-    Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller).map_err(refused)
+pub fn build_controller(cell: &Cell) -> Result<Controller, ParamsError> {
+    Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller)
 }
 
 fn identity(role: Role, epoch: u64, config_hash: u64) -> Identity {

@@ -8,14 +8,19 @@
 //! Held --valid command that continues from here--> Following --no valid command--> Braking --standstill--> Held
 //!                                                      ^------- brake = 1 -------------^
 //! ```
+//! Between the two lies patience: a command that is overdue (`next_due`) but still valid slows the arm along its path,
+//! from nothing at `next_due` to the full brakes at `valid_until`. When commands come again within that time, the arm
+//! joins them smoothly ([`Gap`]) and nobody has to begin anew; a busy computer costs it a little speed.
 //!
 //! **Invariant:** from the first cycle without a valid command the speed of every
 //! joint falls; all joints reach zero together, so the arm brakes along its path.
-//! **Invariant:** a command of a replaced controller never moves the arm again.
+//! **Invariant:** a command of a replaced controller never moves the arm again, and one of its successor only from a
+//! standstill.
 
 use tandem_msg::{JOINTS_MAX, JointCommand, PlantFault, Stamp};
 
 use super::arm::JointModel;
+use super::gap::Gap;
 
 /// Brakes decelerate this many times harder than the arm may accelerate.
 const BRAKE_FACTOR: f64 = 2.0;
@@ -63,6 +68,14 @@ pub(super) struct Drive {
     epoch: u64,
     answered: (u64, Stamp),
     last_seq: u64,
+    /// Share of the brakes in force.
+    braking: f64,
+    /// What the brakes do to the set-point, rad/s²; 0 when it has not coasted.
+    deceleration: [f64; JOINTS_MAX],
+    /// The set-point has gone on without commands since the last one.
+    coasted: bool,
+    /// By how much it is off the commands since then.
+    gap: Gap,
 }
 
 /// Why a command is not followed.
@@ -93,6 +106,10 @@ impl Drive {
             epoch: 0,
             answered: (0, Stamp(0)),
             last_seq: 0,
+            braking: 0.0,
+            deceleration: [0.0; JOINTS_MAX],
+            coasted: false,
+            gap: Gap::default(),
         }
     }
 
@@ -106,16 +123,17 @@ impl Drive {
         measured: &[f64; JOINTS_MAX],
     ) -> SetPoint {
         let verdict = self.judge(now, command, measured);
+        let known = command.header.epoch == self.epoch;
         if command.header.heard() && command.header.config_hash == self.config_hash {
             self.epoch = self.epoch.max(command.header.epoch);
         }
         match verdict {
-            Ok(()) if self.state == State::Following || self.continues(command, measured) => {
-                self.follow(dt, command);
+            Ok(()) if self.state == State::Following && known || self.continues(command, measured) => {
+                self.follow(now, dt, command);
             }
             Ok(()) => {
                 self.brake(dt);
-                // A valid command from elsewhere keeps the brakes shut under its own name.
+                // A valid command from elsewhere, or of a successor, keeps the brakes shut under its own name.
                 self.refuse(PlantFault::CommandRefused);
             }
             Err(Refusal::BrakeAsked) => {
@@ -129,6 +147,11 @@ impl Drive {
             }
         }
         self.set_point
+    }
+
+    /// Share of the brakes in force, 0 to 1.
+    pub(super) fn braking(&self) -> f64 {
+        self.braking
     }
 
     /// Why the brakes are closed, if they are.
@@ -184,40 +207,65 @@ impl Drive {
             })
     }
 
-    fn follow(&mut self, dt: f64, command: &JointCommand) {
+    fn follow(&mut self, now: Stamp, dt: f64, command: &JointCommand) {
         self.fault = PlantFault::None;
         self.answered = (command.header.seq, command.header.stamp);
-        let repeated = self.state == State::Following && command.header.seq == self.last_seq;
+        let followed = self.state == State::Following;
+        let repeated = followed && command.header.seq == self.last_seq;
         self.state = State::Following;
         self.last_seq = command.header.seq;
-        for (index, limit) in self.limits.iter().enumerate().take(self.joint_count) {
-            if repeated {
-                // No news: go on at the speed last asked for, until `valid_until`.
-                let ahead = self.set_point.position[index] + self.set_point.velocity[index] * dt;
-                self.set_point.position[index] = ahead.clamp(limit.position[0], limit.position[1]);
-            } else {
-                self.set_point.position[index] = command.position[index];
-                self.set_point.velocity[index] = command.velocity[index];
-            }
+        if repeated {
+            // No news: on along the path, and slower the longer there is none.
+            self.coast(dt, overdue(now, command));
+            self.coasted = true;
+            return;
+        }
+        let coasted = core::mem::take(&mut self.coasted);
+        if !followed {
+            self.gap = Gap::default();
+        } else if coasted {
+            self.gap = Gap::between(&self.set_point, &self.deceleration, dt, command);
+        } else {
+            self.gap.close(dt);
+        }
+        self.braking = 0.0;
+        self.deceleration = [0.0; JOINTS_MAX];
+        for index in 0..self.joint_count {
+            self.set_point.position[index] = command.position[index] + self.gap.position(index);
+            self.set_point.velocity[index] = command.velocity[index] + self.gap.velocity(index);
         }
     }
 
     fn brake(&mut self, dt: f64) {
+        self.state = if self.coast(dt, 1.0) { State::Held } else { State::Braking };
+    }
+
+    /// Lets the set-point go on along its path, slowed by that share of the brakes. Whether it stands.
+    fn coast(&mut self, dt: f64, share: f64) -> bool {
+        self.braking = share;
         // The joint that needs longest sets the pace; the others share its time to standstill.
         let longest = (0..self.joint_count)
             .map(|index| self.set_point.velocity[index].abs() / self.limits[index].brake)
             .fold(0.0, f64::max);
-        if longest <= dt {
+        if longest <= dt * share {
             self.set_point.velocity = [0.0; JOINTS_MAX];
-            self.state = State::Held;
-            return;
+            return true;
         }
-        self.state = State::Braking;
-        let keep = 1.0 - dt / longest;
-        for index in 0..self.joint_count {
+        let keep = 1.0 - dt * share / longest;
+        for (index, limit) in self.limits.iter().enumerate().take(self.joint_count) {
             let before = self.set_point.velocity[index];
+            self.deceleration[index] = before * (keep - 1.0) / dt;
             self.set_point.velocity[index] = before * keep;
-            self.set_point.position[index] += before * (1.0 + keep) / 2.0 * dt;
+            let ahead = self.set_point.position[index] + before * (1.0 + keep) / 2.0 * dt;
+            self.set_point.position[index] = ahead.clamp(limit.position[0], limit.position[1]);
         }
+        false
     }
+}
+
+/// Share of the brakes for a command that is still valid: 0 until the next one is due, 1 when its validity ends.
+fn overdue(now: Stamp, command: &JointCommand) -> f64 {
+    let late = command.next_due.age_at(now).as_secs_f64();
+    let patience = command.next_due.age_at(command.valid_until).as_secs_f64();
+    if late > 0.0 { (late / patience).min(1.0) } else { 0.0 }
 }

@@ -35,6 +35,7 @@ mod dynamics;
 mod effector;
 mod eye;
 mod frames;
+mod gap;
 mod human;
 mod model;
 mod parts;
@@ -257,6 +258,7 @@ impl Plant {
         state.effort = measured.effort;
         state.command_seq = command_seq;
         state.command_stamp = command_stamp;
+        state.braking = self.drive.braking();
         for position in &mut state.position[..count] {
             let drawn: f64 = StandardNormal.sample(&mut self.noise);
             *position += drawn * self.joint_noise;

@@ -30,7 +30,7 @@ fn a_killed_supervisor_takes_its_roles_along_and_the_next_cell_cleans_up() {
     cell.until_event("run_started");
     cell.signal(Signal::KILL);
     drop(cell);
-    assert!(place.is_deserted(), "{:?}", place.processes(""));
+    assert!(place.is_deserted(), "{:?}", place.running(None));
     assert_eq!(place.run_directories().len(), 1, "the dead cell's");
     assert!(!shared_memory(killed).is_empty());
 
@@ -52,12 +52,12 @@ fn two_cells_run_side_by_side() {
     let (mut one, mut two) = (place.start(6), place.start(7));
     one.until_event("run_started");
     two.until_event("run_started");
-    assert_eq!(place.processes("").len(), 6);
+    assert_eq!(place.running(None).len(), 6);
     one.signal(Signal::TERM);
     let one_pid = one.pid;
     assert_eq!(one.end().status.code(), Some(130));
     assert_eq!(shared_memory(one_pid), Vec::<String>::new());
-    assert_eq!(place.processes("").len(), 3, "the other's");
+    assert_eq!(place.running(None).len(), 3, "the other's");
     two.until_event("step_started");
     two.signal(Signal::TERM);
     let pid = two.pid;

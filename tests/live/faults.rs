@@ -6,7 +6,7 @@ use serde_json::Value;
 use crate::harness::{LiveCell, Place};
 
 fn only(place: &Place, role: &str) -> Pid {
-    let pids = place.processes(role);
+    let pids = place.running(Some(role));
     assert_eq!(pids.len(), 1, "{role}: {pids:?}");
     pids[0]
 }

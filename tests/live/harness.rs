@@ -80,8 +80,8 @@ impl Place {
         entries.map(|entry| entry.path()).collect()
     }
 
-    /// Role processes of cells in this place, by the run directory on their command line.
-    pub(crate) fn processes(&self, role: &str) -> Vec<Pid> {
+    /// Role processes of cells in this place, spares included, by the run directory on their command line.
+    fn processes(&self) -> Vec<(Pid, String)> {
         let here = self.path().display().to_string();
         let entries = fs::read_dir("/proc").expect("readable").flatten();
         entries
@@ -90,15 +90,23 @@ impl Place {
                 let command = fs::read(entry.path().join("cmdline")).ok()?;
                 let words: Vec<_> = command.split(|byte| *byte == 0).map(String::from_utf8_lossy).collect();
                 let ours = words.iter().any(|word| word.starts_with(&here));
-                (ours && words.get(1).is_some_and(|word| word == "role") && words[2].contains(role)).then_some(pid)
+                (ours && words.get(1).is_some_and(|word| word == "role"))
+                    .then(|| (pid, fs::read_to_string(entry.path().join("comm")).unwrap_or_default().trim().to_owned()))
             })
             .collect()
+    }
+
+    /// Those whose turn it is bear the name of their role: of this role, or of any.
+    pub(crate) fn running(&self, role: Option<&str>) -> Vec<Pid> {
+        let named =
+            |name: &str| role.map_or(["plant", "perception", "controller"].contains(&name), |role| role == name);
+        self.processes().into_iter().filter(|(_, name)| named(name)).map(|(pid, _)| pid).collect()
     }
 
     /// Waits until every role process here has gone, and says whether they have.
     pub(crate) fn is_deserted(&self) -> bool {
         let start = Instant::now();
-        while !self.processes("").is_empty() {
+        while !self.processes().is_empty() {
             if start.elapsed() > PATIENCE {
                 return false;
             }
@@ -109,7 +117,7 @@ impl Place {
 
     /// No process, no run directory; no shared memory of the cell whose supervisor was `pid`.
     pub(crate) fn assert_nothing_is_left(&self, pid: Pid) {
-        assert_eq!(self.processes(""), [], "role processes");
+        assert_eq!(self.processes(), [], "role processes");
         assert_eq!(self.run_directories(), Vec::<PathBuf>::new(), "run directories");
         assert_eq!(shared_memory(pid), Vec::<String>::new(), "shared memory");
     }

@@ -18,7 +18,9 @@ pub struct Params {
     pub config_hash: u64,
     /// Time from one cycle to the next.
     pub period: Duration,
-    /// How long the arm may act on a command.
+    /// A command older than so many periods makes the arm slow down; a newer one lets it catch up.
+    pub late_command_periods: u32,
+    /// How long the arm may act on a command; after that it brakes to a standstill.
     pub command_validity: Duration,
     /// Oldest arm state that may be acted on.
     pub arm_age_max: Duration,
@@ -134,6 +136,7 @@ impl Default for Params {
         Self {
             config_hash: 0,
             period: Duration::from_millis(1),
+            late_command_periods: 2,
             command_validity: Duration::from_millis(20),
             arm_age_max: Duration::from_millis(10),
             human_age_max: Duration::from_millis(50),
@@ -224,7 +227,9 @@ impl Params {
         };
         let ms = |duration: Duration| duration.as_secs_f64() * 1e3;
         value("period", ms(self.period), 0.1, 10.0, "ms");
-        value("command_validity", ms(self.command_validity), 2.0 * ms(self.period), 200.0, "ms");
+        value("late_command_periods", self.late_command_periods.into(), 1.0, 100.0, "periods");
+        let late = f64::from(self.late_command_periods) * ms(self.period);
+        value("command_validity", ms(self.command_validity), late + ms(self.period), 200.0, "ms");
         value("arm_age_max", ms(self.arm_age_max), ms(self.period), 100.0, "ms");
         value("human_age_max", ms(self.human_age_max), ms(self.period), 500.0, "ms");
         value("supervisor_age_max", ms(self.supervisor_age_max), ms(self.period), 2_000.0, "ms");

@@ -95,6 +95,11 @@ impl<M: Message> Channel<M> {
         self.epoch
     }
 
+    /// Whether the writer has published anything.
+    pub(crate) fn has_published(&self) -> bool {
+        self.latest.load(Ordering::Acquire) != 0
+    }
+
     /// Publishes. By the one writer only.
     pub(crate) fn publish(&self, value: &M) {
         let number = self.latest.load(Ordering::Relaxed) + 1;

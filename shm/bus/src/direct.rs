@@ -118,6 +118,8 @@ impl PubSub {
 /// The only entry of each blackboard.
 const KEY: u64 = 0;
 
+type Board = iceoryx2::service::port_factory::blackboard::PortFactory<ipc::Service, u64>;
+
 /// A writer of one blackboard and a reader of another.
 pub struct Blackboard {
     writer: EntryHandleMut<ipc::Service, u64, Payload>,
@@ -137,13 +139,7 @@ impl Blackboard {
             builder.add::<Payload>(KEY, Payload::default()).create().map_err(refused("create a blackboard"))
         };
         let (out, inward) = (create(out)?, create(inward)?);
-        let writer = out.writer_builder().create().map_err(refused("create a writer"))?;
-        let reader = inward.reader_builder().create().map_err(refused("create a reader"))?;
-        Ok(Self {
-            writer: writer.entry(&KEY).map_err(refused("write an entry"))?,
-            reader: reader.entry(&KEY).map_err(refused("read an entry"))?,
-            _node: node,
-        })
+        Self::between(node, &out, &inward)
     }
 
     /// Opens both, which are there.
@@ -157,6 +153,10 @@ impl Blackboard {
             builder.open().map_err(refused("open a blackboard"))
         };
         let (out, inward) = (open(out)?, open(inward)?);
+        Self::between(node, &out, &inward)
+    }
+
+    fn between(node: Node<ipc::Service>, out: &Board, inward: &Board) -> Result<Self, DirectError> {
         let writer = out.writer_builder().create().map_err(refused("create a writer"))?;
         let reader = inward.reader_builder().create().map_err(refused("create a reader"))?;
         Ok(Self {

@@ -148,7 +148,7 @@ impl Desk {
         port: Subscriber<ipc::Service, Channel<M>, ()>,
     ) -> (u64, Arc<Door<M>>) {
         let door = Arc::new(Door::default());
-        let reading = Reading { port, offered: None, earlier: Vec::new(), door: Arc::clone(&door) };
+        let reading = Reading { port, held: Vec::new(), door: Arc::clone(&door) };
         (self.keep(reading), door)
     }
 
@@ -205,22 +205,26 @@ impl<M> Default for Door<M> {
     }
 }
 
-impl<M> Door<M> {
+impl<M: Message> Door<M> {
     /// The channel to read, once there is one, and whether it has just become another.
-    /// The one before must not be used any more.
+    /// The one before must not be used any more. A new writer's is entered once something was published in it: until
+    /// then its predecessor may still be at work.
     ///
     /// # Realtime
-    /// Two loads, and a store when it has changed.
+    /// Three loads, and a store when it has changed.
     pub(crate) fn enter(&self) -> Option<(&Channel<M>, bool)> {
-        let offered = self.offered.load(Ordering::Acquire);
-        let changed = self.taken.load(Ordering::Relaxed) != offered;
-        if changed {
-            // Released: whatever was read of the channel before has been read.
-            self.taken.store(offered, Ordering::Release);
+        let (offered, taken) = (self.offered.load(Ordering::Acquire), self.taken.load(Ordering::Relaxed));
+        if taken != offered {
+            // SAFETY: null, or a sample the link holds until that or a newer one was taken, which only the caller of
+            // this does: while the reference lives, `self` is borrowed and this method is not called by its one reader.
+            if let Some(channel) = unsafe { offered.as_ref() }.filter(|channel| channel.has_published()) {
+                // Released: whatever was read of the channel before has been read.
+                self.taken.store(offered, Ordering::Release);
+                return Some((channel, true));
+            }
         }
-        // SAFETY: null, or a sample the link holds until another was offered and taken, which only the caller of this
-        // does: while the reference lives, `self` is borrowed and this method is not called by its one reader.
-        unsafe { offered.as_ref() }.map(|channel| (channel, changed))
+        // SAFETY: as above; what is taken is held.
+        unsafe { taken.as_ref() }.map(|channel| (channel, false))
     }
 
     pub(crate) fn failures(&self) -> u64 {
@@ -232,23 +236,31 @@ type Held<M> = Sample<ipc::Service, Channel<M>, ()>;
 
 struct Reading<M: Message> {
     port: Subscriber<ipc::Service, Channel<M>, ()>,
-    /// Of the newest writer.
-    offered: Option<Held<M>>,
-    /// Of writers before it, until the reader has moved on.
-    earlier: Vec<Held<M>>,
+    /// By the incarnation of their writers: the one that is read, and newer ones.
+    held: Vec<Held<M>>,
     door: Arc<Door<M>>,
 }
 
 impl<M: Message> Reading<M> {
     fn take(&mut self, sample: Held<M>) {
-        let epoch = |held: &Held<M>| held.payload().epoch();
-        if self.offered.as_ref().is_some_and(|held| epoch(held) > epoch(&sample)) {
-            // Of a writer that has been replaced.
-            return;
-        }
         sample.payload().touch();
-        self.door.offered.store(std::ptr::from_ref(sample.payload()).cast_mut(), Ordering::Release);
-        self.earlier.extend(self.offered.replace(sample));
+        let epoch = sample.payload().epoch();
+        let place = self.held.partition_point(|held| held.payload().epoch() <= epoch);
+        self.held.insert(place, sample);
+    }
+
+    /// Lets go of the writers before the one that is read, and offers the newest. Until the reader has read one at
+    /// all, only one that has published.
+    fn offer(&mut self) {
+        let place = |held: &Held<M>| std::ptr::from_ref(held.payload()).cast_mut();
+        let taken = self.door.taken.load(Ordering::Acquire);
+        if let Some(read) = self.held.iter().position(|held| place(held) == taken) {
+            self.held.drain(..read);
+        }
+        let mut newest = self.held.iter().rev();
+        if let Some(held) = newest.find(|held| !taken.is_null() || held.payload().has_published()) {
+            self.door.offered.store(place(held), Ordering::Release);
+        }
     }
 }
 
@@ -264,17 +276,13 @@ impl<M: Message> Tended for Reading<M> {
                 }
             }
         }
-        let offered = self.door.offered.load(Ordering::Relaxed);
-        if !self.earlier.is_empty() && self.door.taken.load(Ordering::Acquire) == offered {
-            self.earlier.clear();
-        }
+        self.offer();
     }
 }
 
 impl<M: Message> Drop for Reading<M> {
     fn drop(&mut self) {
         // The reader's end is gone (`Claim`); its samples go before their port.
-        self.earlier.clear();
-        self.offered = None;
+        self.held.clear();
     }
 }

@@ -124,10 +124,12 @@ pub struct JointState {
     pub command_seq: u64,
     /// Stamp of that command.
     pub command_stamp: Stamp,
+    /// Share of the brakes the arm is slowed by, 0 to 1: of its own accord when commands are late, or as asked.
+    pub braking: f64,
     /// The tool.
     pub effector: EffectorState,
 }
-message!(JointState, 280);
+message!(JointState, 288);
 
 /// What the arm is asked for, controller to plant. SI units, radians.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -135,7 +137,10 @@ message!(JointState, 280);
 pub struct JointCommand {
     /// Header.
     pub header: Header,
-    /// The plant brakes by itself when this instant has passed.
+    /// The next command is due by then. Without it the plant slows down by itself along its path, the harder the
+    /// nearer `valid_until` is; with it, it catches up.
+    pub next_due: Stamp,
+    /// The plant brakes by itself to a standstill when this instant has passed.
     pub valid_until: Stamp,
     /// Joints in use.
     pub joint_count: u32,
@@ -150,4 +155,4 @@ pub struct JointCommand {
     /// The tool.
     pub effector: EffectorCommand,
 }
-message!(JointCommand, 264);
+message!(JointCommand, 272);

@@ -27,6 +27,8 @@ struct Rig {
     request: CellRequest,
     prompt: Prompt,
     now: Stamp,
+    /// Incarnation of the controller.
+    epoch: u64,
     scans: u32,
 }
 
@@ -42,6 +44,7 @@ impl Rig {
             request: CellRequest::default(),
             prompt: Prompt::default(),
             now: Stamp(0),
+            epoch: 1,
             scans: 0,
             cell,
         };
@@ -62,7 +65,8 @@ impl Rig {
     /// One cycle after the controller has said what is in `command`.
     fn cycle(&mut self) {
         let seq = self.command.header.seq + 1;
-        self.command.header = Header { seq, stamp: self.now, epoch: 1, config_hash: self.cell.hash };
+        self.command.header = Header { seq, stamp: self.now, epoch: self.epoch, config_hash: self.cell.hash };
+        self.command.next_due = self.now.after(2 * self.plant.period);
         self.command.valid_until = self.now.after(Duration::from_millis(5));
         self.silent_cycle();
     }

@@ -76,6 +76,75 @@ fn an_arm_whose_commands_cease_brakes_and_stands() {
     assert_eq!(rig.out.arm.command_seq, rig.command.header.seq);
 }
 
+/// A controller that is held up for a few periods and then goes on, in place or where it would have been: the arm slows
+/// meanwhile, harder with each cycle, and joins it again without a jerk and without a fault.
+#[test]
+fn an_arm_whose_commands_are_late_slows_down_and_joins_them_again() {
+    for (pause, catches_up) in (1..=4).flat_map(|pause| [(pause, false), (pause, true)]) {
+        let mut rig = Rig::new(2);
+        rig.cycles(10);
+        let start = rig.command.position;
+        let mut step = 0;
+        let mut command = |rig: &mut Rig, steps: u32| {
+            step += steps;
+            let t = f64::from(step) * 1e-3;
+            // To 0.5 rad/s, then on.
+            let (position, velocity) = if t < 0.25 { (t * t, 2.0 * t) } else { (t / 2.0 - 0.0625, 0.5) };
+            rig.command.position[0] = start[0] + position;
+            rig.command.velocity[0] = velocity;
+            rig.cycle();
+        };
+        (0..400).for_each(|_| command(&mut rig, 1));
+        let (mut braking, mut speed) = (0.0, rig.out.arm.velocity[0]);
+        for late in 1..=pause {
+            rig.silent_cycle();
+            assert!(rig.out.arm.fault.is(PlantFault::None), "after {late} ms");
+            assert!(rig.out.arm.braking >= braking && (rig.out.arm.braking > 0.0) == (late > 1), "after {late} ms");
+            assert_eq!(rig.out.arm.command_seq, rig.command.header.seq);
+            (braking, speed) = (rig.out.arm.braking, speed.min(rig.out.arm.velocity[0]));
+        }
+        assert!(pause < 4 || speed < 0.495, "{speed} rad/s after {pause} ms");
+        let mut before = rig.out.arm.velocity[0];
+        for cycle in 0..250 {
+            command(&mut rig, if cycle == 0 && catches_up { pause + 1 } else { 1 });
+            assert!(rig.out.arm.fault.is(PlantFault::None) && rig.out.arm.braking == 0.0);
+            let now = rig.out.arm.velocity[0];
+            assert!((now - before).abs() < 0.03, "{before} to {now} rad/s, {cycle} ms after a pause of {pause} ms");
+            before = now;
+        }
+        let apart = rig.plant.arm.measured().position[0] - rig.command.position[0];
+        assert!(apart.abs() < 1e-3, "{apart} rad after a pause of {pause} ms");
+    }
+}
+
+/// The successor of a controller that died in full motion is heard before the brakes are shut: they shut all the same,
+/// and it leads the arm from its standstill only.
+#[test]
+fn a_successor_leads_from_a_standstill_only() {
+    let mut rig = Rig::new(2);
+    for step in 1..=300 {
+        rig.command.position[0] += 1e-3 * f64::from(step) / 300.0;
+        rig.command.velocity[0] = f64::from(step) / 300.0;
+        rig.cycle();
+    }
+    rig.epoch = 2;
+    let mut cycles = 0;
+    while rig.out.arm.velocity[0].abs() > 1e-3 {
+        // It stands where the arm is, and asks for nothing.
+        rig.command.position = rig.out.arm.position;
+        rig.command.velocity = [0.0; JOINTS_MAX];
+        rig.cycle();
+        assert!(rig.out.arm.fault.is(PlantFault::CommandRefused), "in cycle {cycles}");
+        assert_eq!((rig.out.arm.braking, rig.out.arm.command_seq), (1.0, 0));
+        cycles += 1;
+        assert!(cycles < 400);
+    }
+    assert!(cycles > 20, "it was fast: {cycles} ms");
+    rig.command.position = rig.out.arm.position;
+    rig.cycles(50);
+    assert!(rig.out.arm.fault.is(PlantFault::None), "and then it leads");
+}
+
 /// Each way a command can be wrong, and what the drives call it.
 #[test]
 fn a_bad_command_never_moves_the_arm() {

@@ -280,6 +280,7 @@ impl Controller {
         let header = command.header;
         *command = JointCommand {
             header,
+            next_due: now.after(self.params.period * self.params.late_command_periods),
             valid_until: now.after(self.params.command_validity),
             joint_count: self.chain.joint_count() as u32,
             brake: u32::from(self.brakes(arm_good)),

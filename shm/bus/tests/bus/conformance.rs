@@ -114,6 +114,32 @@ fn a_restarted_writer_is_believed_and_the_old_one_no_more(bus: &impl Fixture) {
     assert_eq!(read.position[0], 2.0, "{:?}", read.header);
 }
 
+/// A successor that has opened its end and waits for its turn takes nobody's place before it speaks: not with readers
+/// that knew its predecessor, nor with those that come meanwhile.
+fn a_successor_that_waits_silences_nobody(bus: &impl Fixture) {
+    let (mut old, mut early) = (bus.joints(1), bus.joints_reader());
+    old.publish(Stamp(1), &at(1.0)).expect("a free slot");
+    hear(&mut early, |header| header.epoch == 1);
+    let mut successor = bus.joints(2);
+    let mut late = bus.joints_reader();
+    // Long enough for everybody to be connected.
+    let mut said = 1;
+    let mut say = || {
+        said += 1;
+        old.publish(Stamp(said), &at(1.0)).expect("a free slot");
+        said
+    };
+    hear(&mut late, |header| header.epoch == 1 && header.seq == say());
+    for _ in 0..100 {
+        let said = say();
+        assert_eq!((early.read().header.seq, late.read().header.seq), (said, said));
+    }
+    successor.publish(Stamp(1_000), &at(2.0)).expect("a free slot");
+    for reader in [&mut early, &mut late] {
+        assert_eq!(hear(reader, |header| header.epoch == 2).position[0], 2.0);
+    }
+}
+
 /// Two readers of one service do not take values from each other.
 fn readers_are_independent(bus: &impl Fixture) {
     let (mut first, mut second) = (bus.joints_reader(), bus.joints_reader());
@@ -147,6 +173,7 @@ fn conforms<B: Fixture>(fresh: impl Fn() -> B) {
     the_latest_value_is_all_there_is(&fresh());
     a_late_reader_hears_the_last_value(&fresh());
     a_restarted_writer_is_believed_and_the_old_one_no_more(&fresh());
+    a_successor_that_waits_silences_nobody(&fresh());
     readers_are_independent(&fresh());
     a_cloud_is_written_in_place(&fresh());
 }
