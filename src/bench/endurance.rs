@@ -153,7 +153,8 @@ fn live(file: &Path, cell: &Cell, cycles: u64, options: &Options, report: &mut R
     let (last, last_of_plant) = (snapshot(&controller), snapshot(&plant));
     report.finding("commands published less cycles run", commands, Some(0.0), "");
     report.finding("states of the arm published less cycles run", measured, Some(0.0), "");
-    report.finding("controllers and plants started anew", (last.epoch - first.epoch) as f64, Some(0.0), "");
+    let anew = last.epoch - first.epoch + last_of_plant.epoch - first_of_plant.epoch;
+    report.finding("controllers and plants started anew", anew as f64, Some(0.0), "");
     let late = passed_over(&first, &last) + passed_over(&first_of_plant, &last_of_plant);
     report.finding("grid points missed and cycles late, both loops", late as f64, None, "");
     report.finding("commands passed over by the plant", applied.lost as f64, Some(late as f64), "");
@@ -161,15 +162,9 @@ fn live(file: &Path, cell: &Cell, cycles: u64, options: &Options, report: &mut R
     report.finding("states heard", states.heard as f64, None, "");
     guarded(&last, report);
     deciles(&parts, report);
-    report.note(format!(
-        "{} cycles of the controller at {} Hz: {} grid points missed, {} overruns; the plant: {} missed, {} overruns",
-        last.record.cycles - first.record.cycles,
-        1.0 / cell.timing.of(Role::Controller).period.as_secs_f64(),
-        last.record.missed - first.record.missed,
-        last.record.overruns - first.record.overruns,
-        last_of_plant.record.missed - first_of_plant.record.missed,
-        last_of_plant.record.overruns - first_of_plant.record.overruns,
-    ));
+    for (who, first, last) in [("controller", &first, &last), ("plant", &first_of_plant, &last_of_plant)] {
+        report.note(explained(who, first, last));
+    }
     Ok(())
 }
 
@@ -181,6 +176,23 @@ fn passed_over(before: &Snapshot, after: &Snapshot) -> u64 {
     };
     let counted = |snapshot: &Snapshot| snapshot.record.missed + snapshot.record.overruns + late(snapshot);
     counted(after) - counted(before)
+}
+
+/// The grid points a loop has missed, and of what: a wake-up more than a period late is the machine's doing, a cycle longer
+/// than a period the role's.
+fn explained(who: &str, before: &Snapshot, after: &Snapshot) -> String {
+    let lateness = after.record.lateness.since(&before.record.lateness);
+    let period = after.period.as_nanos() as u64;
+    let overslept: u64 = lateness.buckets().filter(|(value, _)| *value > period).map(|(_, count)| count).sum();
+    format!(
+        "{who}: {} cycles at {} Hz, {} grid points missed: in {overslept} wake-ups more than a period late, the latest by \
+         {:.1} ms, and {} cycles longer than a period",
+        after.record.cycles - before.record.cycles,
+        1.0 / after.period.as_secs_f64(),
+        after.record.missed - before.record.missed,
+        lateness.max_ns() as f64 / 1e6,
+        after.record.overruns - before.record.overruns,
+    )
 }
 
 /// What the controller's thread asked of the system, a cycle.
@@ -242,7 +254,7 @@ fn lockstep(file: &Path, cell: &Cell, cycles: u64, options: &Options, report: &m
                 rests.take();
             }
             parts.push(times);
-            (options.tell)(&format!("{part} of {PARTS}: {} s of the cell", sim.now().as_secs_f64()));
+            (options.tell)(&format!("{part} of {PARTS}: {:.0} s of the cell", sim.now().as_secs_f64()));
         }
         Ok(())
     })??;

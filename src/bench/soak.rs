@@ -6,24 +6,28 @@
 
 use std::fs::{read_dir, read_to_string};
 use std::path::Path;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process};
 use tandem_bus::leftovers;
 use tandem_msg::{Coded as _, Role};
 
 use super::cell::{LiveCell, snapshot};
-use super::{BenchError, Options, Report};
+use super::{BenchError, Options, Report, loops};
 use crate::live::{dead_cells, running_cells, sweep};
 
 /// Each of the two roles that are replaced dies so often in a cell.
 const DEATHS_OF_A_ROLE: u32 = 3;
 /// Growth of a process's memory that is none: what its allocator keeps at hand.
 const MEMORY_SLACK_KB: f64 = 4_096.0;
+/// Between two looks at what a cell holds; the first two that agree count, of at most so many.
+const SETTLING: Duration = Duration::from_millis(100);
+const LOOKS_MAX: usize = 20;
 /// Kills between two words on the progress.
 const TOLD_EVERY: u32 = 50;
 
 /// What the supervisor of a cell holds, and what there is of the cell.
+#[derive(Clone, Copy)]
 struct Holdings {
     descriptors: usize,
     memory_kb: usize,
@@ -32,6 +36,21 @@ struct Holdings {
 }
 
 impl Holdings {
+    /// Once the cell has let go of the dead, which it does beside its work.
+    fn settled(cell: &LiveCell) -> Self {
+        let mut last = Self::of(cell);
+        for _ in 0..LOOKS_MAX {
+            std::thread::sleep(SETTLING);
+            let before = std::mem::replace(&mut last, Self::of(cell));
+            if [before.descriptors, before.shared_names, before.files]
+                == [last.descriptors, last.shared_names, last.files]
+            {
+                break;
+            }
+        }
+        last
+    }
+
     fn of(cell: &LiveCell) -> Self {
         let process = format!("/proc/{}", cell.pid());
         let status = read_to_string(format!("{process}/status")).unwrap_or_default();
@@ -58,9 +77,10 @@ impl Holdings {
     }
 }
 
-/// What there is on this host, of all cells and of this process.
-fn host() -> [usize; 3] {
-    [leftovers().len(), running_cells().len() + dead_cells().len(), entries(Path::new("/proc/self/fd"))]
+/// What there is on this host: names in shared memory of those cells, run directories of all, descriptors of this process.
+fn host(cells: &[String]) -> [usize; 3] {
+    let names = leftovers().into_iter().filter(|left| cells.contains(&left.instance)).count();
+    [names, running_cells().len() + dead_cells().len(), entries(Path::new("/proc/self/fd"))]
 }
 
 pub(super) fn run(kills: u32, options: &Options, report: &mut Report) -> Result<(), BenchError> {
@@ -70,14 +90,15 @@ pub(super) fn run(kills: u32, options: &Options, report: &mut Report) -> Result<
     };
     let began = Instant::now();
     sweep();
-    let before = host();
-    let (mut cells, mut by_role, mut failures, mut grown) = (0, [0; 4], Vec::new(), Vec::new());
+    let before = host(&[]);
+    // What the loops are granted.
+    loops::set_up(None, &mut report.conditions, || ())?;
+    let (mut cells, mut by_role, mut failures, mut grown) = (Vec::new(), [0; 4], Vec::new(), Vec::new());
     let done = |by_role: &[u32; 4]| by_role.iter().sum::<u32>();
     let mut told = 0;
     while done(&by_role) < kills && failures.is_empty() {
-        cells += 1;
         let left = kills - done(&by_role);
-        match one_cell(file, cells, left, &mut by_role) {
+        match one_cell(file, &mut cells, left, &mut by_role) {
             Ok(found) => grown.push(found),
             // Not one more after that: it is to be looked into.
             Err(error) => failures.push(error.to_string()),
@@ -85,17 +106,19 @@ pub(super) fn run(kills: u32, options: &Options, report: &mut Report) -> Result<
         if done(&by_role) >= told + TOLD_EVERY {
             told = done(&by_role);
             (options.tell)(&format!(
-                "{told} of {kills} kills in {cells} cells, {:.0} s",
+                "{told} of {kills} kills in {} cells, {:.0} s",
+                cells.len(),
                 began.elapsed().as_secs_f64()
             ));
         }
     }
     // What the last one has left is swept when the next one starts, as always.
-    drop(LiveCell::start(file, cells + 1)?);
-    let after = host();
+    drop(LiveCell::start(file, cells.len() as u64 + 1)?);
+    let after = host(&cells);
     let of = |role: Role| by_role[role as usize];
     report.note(format!(
-        "{cells} cells in {:.0} s; killed: controller {}, perception {}, plant {}, supervisor {}",
+        "{} cells in {:.0} s; killed: controller {}, perception {}, plant {}, supervisor {}",
+        cells.len(),
         began.elapsed().as_secs_f64(),
         of(Role::Controller),
         of(Role::Perception),
@@ -110,7 +133,7 @@ pub(super) fn run(kills: u32, options: &Options, report: &mut Report) -> Result<
     report.finding("a cell's names in shared memory, growth", most(2), Some(0.0), "");
     report.finding("a cell's files, growth", most(3), Some(0.0), "");
     for (index, what) in
-        ["names in shared memory", "run directories", "descriptors of the bench"].into_iter().enumerate()
+        ["names of these cells in shared memory", "run directories", "descriptors of the bench"].into_iter().enumerate()
     {
         report.finding(format!("{what}, growth in all"), after[index] as f64 - before[index] as f64, Some(0.0), "");
     }
@@ -119,17 +142,19 @@ pub(super) fn run(kills: u32, options: &Options, report: &mut Report) -> Result<
 }
 
 /// One cell from its start to its end; kills at most so many. By how much its holdings have grown over the replacements.
-fn one_cell(file: &Path, seed: u64, left: u32, by_role: &mut [u32; 4]) -> Result<[f64; 4], BenchError> {
+fn one_cell(file: &Path, cells: &mut Vec<String>, left: u32, by_role: &mut [u32; 4]) -> Result<[f64; 4], BenchError> {
+    let seed = cells.len() as u64 + 1;
     let mut cell = LiveCell::start(file, seed)?;
+    cells.push(cell.seat().running().name().to_owned());
     cell.wait_for_spares()?;
-    let before = Holdings::of(&cell);
+    let before = Holdings::settled(&cell);
     let replaced = [Role::Controller, Role::Perception].into_iter().cycle();
     for role in replaced.take((2 * DEATHS_OF_A_ROLE).min(left - 1) as usize) {
         kill(&cell, role, by_role)?;
         cell.wait_for("recovered", |told| told["role"] == role.name())?;
         cell.wait_for_spares()?;
     }
-    let grown = Holdings::of(&cell).grown(&before);
+    let grown = Holdings::settled(&cell).grown(&before);
     kill(&cell, if seed.is_multiple_of(2) { Role::Plant } else { Role::Supervisor }, by_role)?;
     cell.wait_for_end()?;
     Ok(grown)

@@ -249,6 +249,7 @@ impl Drive {
             .fold(0.0, f64::max);
         if longest <= dt * share {
             self.set_point.velocity = [0.0; JOINTS_MAX];
+            self.deceleration = [0.0; JOINTS_MAX];
             return true;
         }
         let keep = 1.0 - dt * share / longest;

@@ -1,6 +1,7 @@
 //! The plant and its ports.
 
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::time::Duration;
 
 use tandem_bus::{Read, Write};
 use tandem_msg::{
@@ -9,6 +10,9 @@ use tandem_msg::{
 
 use super::{Ports, service};
 use crate::plant::{Eye, Plant, PlantInputs, PlantOutputs, Shot};
+
+/// Between two looks of an idle camera at who looks at its pictures.
+const TEND: Duration = Duration::from_millis(50);
 
 /// The plant with its ports.
 pub struct PlantRole<P: Ports> {
@@ -50,10 +54,14 @@ impl CameraRole {
 
     /// Takes the pictures the plant asks for, until the plant is dropped.
     pub fn run(mut self, mut cloud: impl Write<PointCloud>) {
-        for (stamp, shot) in self.shots {
-            // Straight into the loaned sample: a cloud is never copied. One that is lost is missed by the
-            // supervisor, which has the part scanned again.
-            let _ = cloud.publish_with(stamp, |cloud| self.eye.scan(&shot, cloud));
+        loop {
+            match self.shots.recv_timeout(TEND) {
+                // Straight into the loaned sample: a cloud is never copied. One that is lost is missed by the
+                // supervisor, which has the part scanned again.
+                Ok((stamp, shot)) => drop(cloud.publish_with(stamp, |cloud| self.eye.scan(&shot, cloud))),
+                Err(RecvTimeoutError::Timeout) => cloud.tend(),
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
         }
     }
 }

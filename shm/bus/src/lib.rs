@@ -71,6 +71,10 @@ pub trait Write<M: Message> {
     fn publish(&mut self, stamp: Stamp, message: &M) -> Result<Header, Unsent> {
         self.publish_with(stamp, |slot| *slot = *message)
     }
+
+    /// Meets readers that have come and lets go of those that have gone, without publishing. For a writer that seldom
+    /// publishes and connects where it does ([`Lender`]); nothing to do for others.
+    fn tend(&mut self) {}
 }
 
 /// Reads the latest value of one message type.

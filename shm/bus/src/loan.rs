@@ -9,6 +9,7 @@
 
 use iceoryx2::port::publisher::Publisher as Port;
 use iceoryx2::port::subscriber::Subscriber;
+use iceoryx2::port::update_connections::UpdateConnections as _;
 use iceoryx2::prelude::ipc;
 use iceoryx2::sample::Sample;
 use tandem_msg::{Header, Message, Stamp};
@@ -69,6 +70,11 @@ impl<M: Message> Write<M> for Lender<M> {
         // A publication that reached only some readers has used its number.
         self.last = header;
         sample.send().map(|_| header).map_err(|_| Unsent::Connection)
+    }
+
+    fn tend(&mut self) {
+        // What failed is tried again with the next publication.
+        let _ = self.port.update_connections();
     }
 }
 
