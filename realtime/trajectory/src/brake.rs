@@ -45,8 +45,9 @@ pub(crate) struct Prefix {
 pub(crate) fn prefix(joint: &Joint, velocity_min: f64, soft: bool) -> Option<Prefix> {
     let [velocity, acceleration] = joint.start;
     // Whatever a start does that is within the limits and can stay there, nothing is to do.
-    let rising = joint.fall * acceleration.max(0.0).powi(2) / 2.0;
-    let falling = joint.rise * acceleration.min(0.0).powi(2) / 2.0;
+    let square = acceleration * acceleration;
+    let rising = if acceleration > 0.0 { joint.fall * square / 2.0 } else { 0.0 };
+    let falling = if acceleration < 0.0 { joint.rise * square / 2.0 } else { 0.0 };
     let contained = acceleration <= joint.top && acceleration >= -joint.bottom;
     if contained && velocity + rising <= joint.peak && velocity - falling >= velocity_min {
         return None;

@@ -186,6 +186,6 @@ impl Marks {
     }
 
     fn sorted(&self) -> &[f64] {
-        &self.times[..self.count]
+        &self.times[..self.count.min(self.times.len())]
     }
 }

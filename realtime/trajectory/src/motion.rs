@@ -50,20 +50,21 @@ impl Phases {
 #[inline(always)]
 pub(crate) fn starts(phases: &[Phase], begin: f64, time: f64) -> [Instant; 8] {
     let mut starts = [Instant::at(begin); 8];
-    let (mut pivot, mut longest) = (7, 0.0);
+    let phases = phases.get(..7).unwrap_or(phases);
+    let (mut pivot, mut longest) = (phases.len(), 0.0);
     for (place, phase) in phases.iter().enumerate() {
         if phase.slope == 0 && phase.duration > longest {
             (pivot, longest) = (place, phase.duration);
         }
     }
-    let count = phases.len().min(7);
-    for place in 0..count.min(pivot) {
-        starts[place + 1] = starts[place].after(phases[place].duration);
+    // Places are below eight; `& 7` shows it.
+    for (place, phase) in phases.iter().enumerate().take(pivot) {
+        starts[(place + 1) & 7] = starts[place & 7].after(phase.duration);
     }
-    if pivot < count {
-        starts[count] = Instant::at(begin + time);
-        for place in (pivot + 1..count).rev() {
-            starts[place] = starts[place + 1].after(-phases[place].duration);
+    if pivot < phases.len() {
+        starts[phases.len() & 7] = Instant::at(begin + time);
+        for (place, phase) in phases.iter().enumerate().skip(pivot + 1).rev() {
+            starts[place & 7] = starts[(place + 1) & 7].after(-phase.duration);
         }
     }
     starts
@@ -136,13 +137,13 @@ impl<'a> Walk<'a> {
     /// Its part of the jerk of the mixture, and what stands for that in a profile.
     #[inline]
     pub(crate) fn share(&self) -> (f64, u64) {
-        (self.part.shares[self.slope], self.part.codes[self.slope])
+        (self.part.shares[self.slope.min(2)], self.part.codes[self.slope.min(2)])
     }
 
     /// Goes on by `time` within the phase.
     #[inline]
     pub(crate) fn advance(&mut self, time: f64) {
-        let jerk = self.part.jerks[self.slope];
+        let jerk = self.part.jerks[self.slope.min(2)];
         self.velocity += time * (self.acceleration + time * jerk / 2.0);
         self.acceleration += time * jerk;
     }

@@ -4,7 +4,6 @@
 //! `TANDEM_CAMPAIGN=1000 cargo test --release -p tandem-trajectory --test solver -- --nocapture`
 #![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate and print")]
 
-mod bits;
 mod cases;
 mod check;
 mod closed_loop;

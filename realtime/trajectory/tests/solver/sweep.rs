@@ -63,7 +63,8 @@ fn every_random_problem_is_solved_validly() {
                     Kind::Scales => 1e-13,
                     _ => 1e-14,
                 };
-                let excess = 1e-11 + (2.0 * blur + 1e-15 * push) * duration;
+                // A cruise of hours turns roundings of the acceleration before it into a velocity.
+                let excess = 1e-11 + (2.0 * blur + 4e-15 * push) * duration;
                 assert!(
                     relative[0] < near
                         && relative[1] < if kind == Kind::Noise { 1e-11 } else { 1e-14 }
