@@ -1,6 +1,6 @@
 //! Against ruckig's C++: never longer than what it finds, and valid by an independent check.
 
-use crate::cases::{self, Case};
+use crate::cases::{self, Case, JointCase};
 use crate::check::{Faults, check};
 use tandem_trajectory::{Error, Interface, Profile, Trajectory};
 
@@ -49,46 +49,43 @@ fn every_valid_case_is_solved_and_no_invalid_one() {
     }
 }
 
-/// In motions of less than a millisecond ruckig lives off its final tolerance of 1e-8 (it reaches
-/// targets one rounding away in no time), so its durations there bound nothing.
+/// Whether no motion of `duration` exists, for states almost at rest: a jerk `j` moves from rest to rest by at most
+/// `j T^3 / 32`, changes a velocity by at most `j T^2 / 4`, and what the states bring with them adds little.
+fn impossible(joint: &JointCase, duration: f64) -> bool {
+    let JointCase { start, target, limits, .. } = joint;
+    let jerk = limits.jerk_max.max(-limits.jerk_min);
+    let speed = start.velocity.abs() + target.velocity.abs();
+    let push = start.acceleration.abs() + target.acceleration.abs();
+    let moved = jerk * duration.powi(3) / 32.0 + speed * duration + push * duration.powi(2);
+    let changed = jerk * duration.powi(2) / 4.0 + push * duration;
+    (target.position - start.position).abs() > moved || (target.velocity - start.velocity).abs() > changed
+}
+
+/// The only longer ones, of less than a tenth of a millisecond, belong to starts a few roundings from the target, which
+/// ruckig takes for the target (it asks for 1e-8): it finds durations in which no motion gets there.
 #[test]
 fn no_duration_is_longer_than_the_verified_one() {
+    let mut longer = 0;
     for case in cases::load().iter().filter(|case| case.verified) {
         let (duration, _) = solve_any(case).expect("solved above");
-        let minima = minima(case);
-        let loose = case.tag == "noise" || case.tag == "tiny";
-        if !(loose && case.duration < 2e-3) {
-            assert!(
-                duration <= case.duration * (1.0 + 1e-9) + 1e-9,
-                "case {} ({}): {duration} > {}",
-                case.id,
-                case.tag,
-                case.duration
-            );
+        let bound = |time: f64| time * (1.0 + 1e-9) + 1e-9;
+        let name = format!("case {} ({})", case.id, case.tag);
+        if duration > bound(case.duration) {
+            longer += 1;
+            let unreached = case.joints.iter().any(|joint| impossible(joint, case.duration));
+            assert!(unreached && case.duration < 1e-4, "{name}: {duration} > {}", case.duration);
         }
-        for (index, (&minimum, joint)) in minima.iter().zip(&case.joints).enumerate() {
-            if !(loose && joint.minimum < 2e-3) {
-                let bound = joint.minimum * (1.0 + 1e-9) + 1e-9;
-                assert!(
-                    minimum <= bound,
-                    "case {} ({}) joint {index}: {minimum} > {}",
-                    case.id,
-                    case.tag,
-                    joint.minimum
-                );
+        for (index, (&minimum, joint)) in minima(case).iter().zip(&case.joints).enumerate() {
+            if minimum > bound(joint.minimum) {
+                let unreached = impossible(joint, joint.minimum) && joint.minimum < 1e-4;
+                assert!(unreached, "{name} joint {index}: {minimum} > {}", joint.minimum);
             }
-            if let Some(best) = joint.best
-                && !(loose && best < 2e-3)
-            {
-                assert!(
-                    minimum <= best * (1.0 + 1e-6),
-                    "case {} ({}) joint {index}: {minimum} > {best}",
-                    case.id,
-                    case.tag
-                );
+            if let Some(best) = joint.best {
+                assert!(minimum <= best * (1.0 + 1e-6), "{name} joint {index}: {minimum} > {best}");
             }
         }
     }
+    println!("{longer} longer than what ruckig finds, in none of which a motion gets there");
 }
 
 /// End state and limits by exact integration of the segments. The errors of the end state are
