@@ -50,8 +50,11 @@ pub struct Input<const N: usize> {
     pub target: [State; N],
     /// Limits of each joint.
     pub limits: [Limits; N],
-    /// How far from its target position a joint may end where more exactness would cost time, as when
-    /// the start is measured with noise. 0 asks for the target to within rounding.
+    /// How far from its target position a joint may end where more exactness would cost time out of proportion,
+    /// as when the start is measured with noise. A joint that brakes at its limits has nothing left to correct a
+    /// miss `d` with, and swings past the target and back, for `cbrt(32 d / jerk)` seconds. Noise of size `e` in
+    /// every cycle of `h` seconds comes to about `4 e (1 + t) sqrt(1 + t / h)` in `t` seconds of braking. 0 asks
+    /// for the target to within roundings, and what a motion recomputed from its own output collects of them.
     pub tolerance: [f64; N],
     /// Lowest and highest position each joint may take on the way. There is no way round them: a motion
     /// that would pass one is [`Error::PositionLimit`]. Infinite for none.

@@ -61,6 +61,9 @@ pub(crate) struct Durations {
     pub(crate) gap_start: f64,
     /// Infinite without a gap.
     pub(crate) gap_end: f64,
+    /// The acceleration that is waited at, or turned at, in the motion that takes `first`; NaN where that is
+    /// one jerk.
+    plateau: f64,
 }
 
 impl Durations {
@@ -94,15 +97,15 @@ impl Swing {
         let Swing { start, end, gain, top, bottom, rise, fall } = *self;
         let none = f64::INFINITY;
         if rise + fall == 0.0 {
-            let first = if gain >= 0.0 { gain / top } else { -gain / bottom };
-            return Durations { first, gap_start: none, gap_end: none };
+            let plateau = if gain >= 0.0 { top } else { -bottom };
+            return Durations { first: gain / plateau, gap_start: none, gap_end: none, plateau };
         }
         let (tip_time, tip_gain) = self.tip();
         let scale = velocity_scale + (rise + fall) * (start * start + end * end) / 2.0;
         let off = (gain - tip_gain).abs();
         let jumps = if gain < tip_gain { start.min(end) > 0.0 } else { start.max(end) < 0.0 };
         if off <= TIE * scale || (jumps && off <= LOOSE_TIE * scale) {
-            let mut durations = Durations { first: tip_time, gap_start: none, gap_end: none };
+            let mut durations = Durations { first: tip_time, gap_start: none, gap_end: none, plateau: f64::NAN };
             if start.min(end) > 0.0 {
                 (durations.gap_start, durations.gap_end) = self.gap();
             } else if start.max(end) < 0.0 {
@@ -111,8 +114,9 @@ impl Swing {
             durations.gap_start = durations.gap_start.max(tip_time);
             durations
         } else {
-            let side = if gain > tip_gain { *self } else { self.mirrored() };
-            side.above()
+            let (side, sign) = if gain > tip_gain { (*self, 1.0) } else { (self.mirrored(), -1.0) };
+            let durations = side.above();
+            Durations { plateau: sign * durations.plateau, ..durations }
         }
     }
 
@@ -149,24 +153,10 @@ impl Swing {
     /// p between:     gain = tip + p (T - ramp), one ramp straight from a0 to af
     /// ```
     #[inline(always)]
-    pub(crate) fn waiting(&self, time: f64, velocity: f64) -> [Phase; 3] {
-        let Swing { start, end, gain, top, bottom, rise, fall } = *self;
-        let (tip_time, tip_gain) = self.tip();
-        let rest = (time - tip_time).max(0.0);
-        let (high, low) = (start.max(end), start.min(end));
-        // What is to gain beyond waiting at the higher acceleration, or at the lower.
-        let (more, less) = (gain - tip_gain - high * rest, tip_gain + low * rest - gain);
-        let plateau = if rise + fall == 0.0 {
-            if time > 0.0 { (gain / time).max(-bottom).min(top) } else { 0.0 }
-        } else if more > 0.0 || less > 0.0 {
-            let (sign, edge, more, limit) =
-                if more > 0.0 { (1.0, high, more, top) } else { (-1.0, -low, less, bottom) };
-            sign * above(edge, more, rest, (rise + fall) / 2.0).min(limit)
-        } else if rest > 0.0 {
-            ((gain - tip_gain) / rest).max(low).min(high)
-        } else {
-            start
-        };
+    pub(crate) fn waiting(&self, time: f64, velocity: f64, durations: &Durations) -> [Phase; 3] {
+        let Swing { start, end, rise, fall, .. } = *self;
+        let fastest = time == durations.first && !durations.plateau.is_nan();
+        let plateau = if fastest { durations.plateau } else { self.plateau(time) };
         let ramp = |from: f64, to: f64| {
             let (change, slope) = if to >= from { (rise, 1) } else { (-fall, -1) };
             (change * (to - from), change, slope)
@@ -181,6 +171,27 @@ impl Swing {
             phase(wait, turned, plateau, 0),
             phase(last, turned + wait * plateau, plateau, slope_last),
         ]
+    }
+
+    /// The acceleration to wait at so that the gain is made in `time`.
+    fn plateau(&self, time: f64) -> f64 {
+        let Swing { start, end, gain, top, bottom, rise, fall } = *self;
+        let (tip_time, tip_gain) = self.tip();
+        let rest = (time - tip_time).max(0.0);
+        let (high, low) = (start.max(end), start.min(end));
+        // What is to gain beyond waiting at the higher acceleration, or at the lower.
+        let (more, less) = (gain - tip_gain - high * rest, tip_gain + low * rest - gain);
+        if rise + fall == 0.0 {
+            if time > 0.0 { (gain / time).max(-bottom).min(top) } else { 0.0 }
+        } else if more > 0.0 || less > 0.0 {
+            let (sign, edge, more, limit) =
+                if more > 0.0 { (1.0, high, more, top) } else { (-1.0, -low, less, bottom) };
+            sign * above(edge, more, rest, (rise + fall) / 2.0).min(limit)
+        } else if rest > 0.0 {
+            ((gain - tip_gain) / rest).max(low).min(high)
+        } else {
+            start
+        }
     }
 
     /// The same swing with every sign turned.
@@ -201,7 +212,7 @@ impl Swing {
             rise * (top - start) + fall * (top - end) + (gain - ramps) / top
         };
         let (gap_start, gap_end) = if start > 0.0 && end > 0.0 { self.gap() } else { (f64::INFINITY, f64::INFINITY) };
-        Durations { first: first.max(0.0), gap_start: gap_start.max(first), gap_end }
+        Durations { first: first.max(0.0), gap_start: gap_start.max(first), gap_end, plateau: turn.min(top) }
     }
 
     /// Where `low` exceeds the gain, for positive accelerations at both ends.

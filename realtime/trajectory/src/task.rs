@@ -114,11 +114,11 @@ impl Task {
     /// `false` if the numbers left the range of doubles on the way.
     pub(crate) fn write(&mut self, input: &JointInput, duration: f64, profile: &mut Profile) -> bool {
         let mut writer = Writer::new(profile, &input.limits, input.start.position, duration);
-        if let Goal::Velocity(swing, _) = &self.goal
+        if let Goal::Velocity(swing, durations) = &self.goal
             && self.begin == 0.0
             && self.tail == 0.0
         {
-            writer.follow_here(&swing.waiting(duration, input.start.velocity));
+            writer.follow_here(&swing.waiting(duration, input.start.velocity, durations));
             let target = State { position: writer.position, ..input.target };
             return writer.finish(target, target.position.abs()).is_finite();
         }
@@ -138,7 +138,7 @@ impl Task {
             writer.end = duration - self.tail;
             match &mut self.goal {
                 Goal::Position(reach) => write_reach(reach, time, &mut writer),
-                Goal::Velocity(swing, _) => writer.follow(&swing.waiting(time, velocity)),
+                Goal::Velocity(swing, durations) => writer.follow(&swing.waiting(time, velocity, durations)),
             }
             if self.tail > 0.0
                 && let Some(prefix) = prefix(&self.joint(input).reversed(), input)
