@@ -8,8 +8,7 @@
 //! at the first contact and ours goes on to the deepest.
 #![allow(clippy::disallowed_types, clippy::disallowed_methods, clippy::disallowed_macros, reason = "a bench measures")]
 
-#[allow(dead_code, reason = "the tests use the rest")]
-#[path = "../tests/oracle/reference.rs"]
+#[path = "../tests/reference/mod.rs"]
 mod reference;
 
 use std::cell::RefCell;

@@ -26,12 +26,15 @@
 //! **Invariant:** what is not finite, or absurdly far off, is a contact: the answer is −∞.
 //! **Invariant:** no query allocates, blocks or panics; every loop has a constant bound.
 
+mod answer;
 mod body;
 mod contacts;
+mod hull;
 mod kernel;
 mod lanes;
 mod mesh;
 mod monitor;
+mod nearest;
 mod obstacle;
 pub mod pfl;
 mod placed;
@@ -41,9 +44,10 @@ mod sweep;
 mod targets;
 mod track;
 
+pub use answer::{Clearance, Pairing, Separation};
 pub use body::{ArmBody, BodyError, LINK_CAPSULES_MAX, LinkCapsule, SELF_PAIRS_MAX};
 pub use contacts::{LinkPair, Meeting};
-pub use monitor::{Clearance, Monitor, Pairing, Separation};
+pub use monitor::Monitor;
 pub use obstacle::SceneFault;
 pub use shapes::{HULL_POINTS_MAX, MESH_TRIANGLES_MAX, ShapeError, Shapes};
 pub use sweep::{MotionSweep, Swept};

@@ -7,80 +7,17 @@ use nalgebra::Vector3;
 use tandem_kinematics::LinkPoses;
 use tandem_msg::{AttachedPart, Capsule, HUMAN_CAPSULES_MAX, SCENE_OBJECTS_MAX, SceneObject};
 
-use crate::kernel::{Near, Wanted};
+use crate::kernel::Wanted;
+use crate::nearest::{against, against_itself, check, check_own, may_be_nearer};
 use crate::obstacle::{CarriedPart, FAR, Obstacle, SceneFault};
-use crate::placed::{Placed, PlacedArm};
+use crate::placed::PlacedArm;
 use crate::shapes::Shapes;
-use crate::targets::{CHUNK, Targets};
+use crate::targets::Targets;
 use crate::track::Recent;
-use crate::{ArmBody, BodyError, LINK_CAPSULES_MAX};
+use crate::{ArmBody, BodyError, Clearance, Pairing, Separation};
 
 /// Objects a task may allow the tool to touch.
 const TOUCH_MAX: usize = 8;
-
-/// The smallest distance between the arm, or what it carries, and what it must not touch.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Clearance {
-    /// Signed, metres: below 0 when they overlap; +∞ when there is nothing, −∞ when a number was not finite.
-    pub distance: f64,
-    /// Link of the arm (0 the base); the carried part counts as the last.
-    pub link: usize,
-    /// Object, by its id; 0 is the arm itself.
-    pub object: u32,
-    /// Nearest point of the arm, base frame, metres.
-    pub point_on_arm: [f64; 3],
-    /// Nearest point of the object, or of the other link.
-    pub point_on_other: [f64; 3],
-}
-
-/// The smallest distance between the arm, or what it carries, and a person.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Separation {
-    /// Signed, metres: +∞ when nobody is in view, −∞ when a number was not finite.
-    pub distance: f64,
-    /// Link of the arm; the carried part counts as the last.
-    pub link: usize,
-    /// Capsule of the person, its index.
-    pub capsule: usize,
-    /// Unit vector from the arm to the person at the nearest points, base axes; zero when unknown.
-    pub direction: [f64; 3],
-    /// Velocity of that capsule, m/s.
-    pub human_velocity: [f64; 3],
-    /// Nearest point of the arm, base frame, metres.
-    pub point_on_arm: [f64; 3],
-}
-
-impl Separation {
-    const NOBODY: Self = Self {
-        distance: f64::INFINITY,
-        link: 0,
-        capsule: 0,
-        direction: [0.0; 3],
-        human_velocity: [0.0; 3],
-        point_on_arm: [0.0; 3],
-    };
-}
-
-/// A capsule of the arm, or the carried part, and a capsule of a person.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pairing {
-    /// Link of the arm; the carried part counts as the last.
-    pub link: usize,
-    /// Capsule of the person, its index.
-    pub capsule: usize,
-    /// Signed, metres; −∞ when it came to no number.
-    pub distance: f64,
-    /// Nearest points of the arm and of the person, base frame, metres.
-    pub points: [[f64; 3]; 2],
-}
-
-impl Pairing {
-    #[inline]
-    fn of(near: &Near, link: usize, capsule: usize) -> Self {
-        let distance = if near.distance.is_nan() { f64::NEG_INFINITY } else { near.distance };
-        Self { link, capsule, distance, points: [near.on_first.into(), near.on_second.into()] }
-    }
-}
 
 /// Distances of one arm to one scene and to people.
 ///
@@ -208,7 +145,7 @@ impl Monitor {
     pub fn clearance(&self, poses: &LinkPoses) -> Clearance {
         let mut arm = self.unplaced(poses);
         if !arm.place() || !self.is_sound() {
-            return contact();
+            return Clearance::CONTACT;
         }
         self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY)
     }
@@ -217,10 +154,11 @@ impl Monitor {
     pub fn measure(&self, poses: &LinkPoses) -> (Clearance, Separation) {
         let mut arm = self.unplaced(poses);
         if !arm.place() || !self.part_valid {
-            return (contact(), lost());
+            return (Clearance::CONTACT, Separation::LOST);
         }
-        let clearance = if self.scene_valid { self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY) } else { contact() };
-        (clearance, if self.people_valid { self.nearest_person(&arm) } else { lost() })
+        let clearance =
+            if self.scene_valid { self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY) } else { Clearance::CONTACT };
+        (clearance, if self.people_valid { self.nearest_person(&arm) } else { Separation::LOST })
     }
 
     /// Whether scene and arm itself are more than `margin` metres away. People are not looked at.
@@ -237,7 +175,7 @@ impl Monitor {
     pub fn separation(&self, poses: &LinkPoses) -> Separation {
         let mut arm = self.unplaced(poses);
         if !arm.place() || !self.part_valid || !self.people_valid {
-            return lost();
+            return Separation::LOST;
         }
         self.nearest_person(&arm)
     }
@@ -247,11 +185,11 @@ impl Monitor {
     pub fn separations(&self, poses: &LinkPoses) -> [Separation; HUMAN_CAPSULES_MAX] {
         let mut arm = self.unplaced(poses);
         if !arm.place() || !self.part_valid || !self.people_valid {
-            return [lost(); HUMAN_CAPSULES_MAX];
+            return [Separation::LOST; HUMAN_CAPSULES_MAX];
         }
         let mut all = [Separation::NOBODY; HUMAN_CAPSULES_MAX];
         for (index, (person, slot)) in self.people.all().iter().zip(&mut all).enumerate() {
-            let mut best = nothing();
+            let mut best = Clearance::NOTHING;
             for body in arm.bodies().iter().rev().filter(|body| body.link != 0) {
                 let gap = self.people.squared_gap(index, &body.centre, &body.half);
                 if may_be_nearer(gap, best.distance + body.radius + self.people.around(index)) {
@@ -324,20 +262,12 @@ impl Monitor {
 
     /// The nearest of all pairs that are nearer than `limit`; stops early once below `enough`.
     fn nearest(&self, arm: &PlacedArm, limit: f64, enough: f64) -> Clearance {
-        let mut best = Clearance { distance: limit, ..nothing() };
+        let mut best = Clearance { distance: limit, ..Clearance::NOTHING };
         against(arm, &self.scene, &self.touch, enough, &mut best);
         if best.distance > enough {
-            self.arm_to_itself(arm, enough, &mut best);
+            against_itself(arm, &self.body, enough, &mut best);
         }
         best
-    }
-
-    fn arm_to_itself(&self, arm: &PlacedArm, enough: f64, best: &mut Clearance) {
-        let bodies = arm.bodies();
-        for [a, b] in self.body.self_pairs() {
-            check_own(arm, &bodies[a], &bodies[b], enough, best);
-        }
-        part_to_arm(arm, enough, best);
     }
 
     /// Distance of two links, whether the pair is to be checked or not: +∞ when one has no shape, −∞ when a
@@ -347,7 +277,7 @@ impl Monitor {
         if !arm.place() {
             return f64::NEG_INFINITY;
         }
-        let mut best = nothing();
+        let mut best = Clearance::NOTHING;
         let of = |link: usize| arm.bodies().iter().filter(move |body| body.link == link && !body.is_part());
         for first in of(links[0]) {
             for second in of(links[1]) {
@@ -358,7 +288,7 @@ impl Monitor {
     }
 
     fn nearest_person(&self, arm: &PlacedArm) -> Separation {
-        let mut best = nothing();
+        let mut best = Clearance::NOTHING;
         against(arm, &self.people, &[], f64::NEG_INFINITY, &mut best);
         self.separation_of(&best)
     }
@@ -390,130 +320,4 @@ impl From<ArmBody> for Monitor {
     fn from(body: ArmBody) -> Self {
         Self::new(body)
     }
-}
-
-/// The part against the links it does not hang on.
-pub(crate) fn part_to_arm(arm: &PlacedArm, enough: f64, best: &mut Clearance) {
-    if let Some(part) = arm.part() {
-        for body in arm.bodies().iter().filter(|body| body.link < part.link) {
-            check_own(arm, part, body, enough, best);
-        }
-    }
-}
-
-/// The arm against all targets. Tool and part may touch those that `touch` names.
-#[inline]
-fn against<const N: usize>(arm: &PlacedArm, targets: &Targets<N>, touch: &[u32], enough: f64, best: &mut Clearance) {
-    let may_touch = |body: &Placed, obstacle: &Obstacle| body.tool && touch.contains(&obstacle.id);
-    let bodies = arm.bodies();
-    if targets.all().is_empty() {
-        return;
-    }
-    // Boxes tell which pair is likely to be the nearest; once it is known, they spare nearly all others.
-    let mut least = [0.0; LINK_CAPSULES_MAX + 1];
-    if enough == f64::NEG_INFINITY {
-        let mut first = (f64::INFINITY, 0);
-        for (index, body) in bodies.iter().enumerate().filter(|(_, body)| body.link != 0) {
-            least[index] = targets.squared_gap_min(&body.centre, &body.half);
-            if least[index] < first.0 {
-                first = (least[index], index);
-            }
-        }
-        let body = &bodies[first.1];
-        let gaps = targets.squared_gaps(&body.centre, &body.half);
-        let nearest = gaps.iter().zip(targets.all()).find(|(gap, _)| **gap == first.0);
-        if let Some((_, obstacle)) = nearest.filter(|(_, obstacle)| !may_touch(body, obstacle)) {
-            check(arm, body, obstacle, enough, best);
-        }
-    }
-    // From the tool inwards: what is nearest is mostly out there.
-    for (body, least) in bodies.iter().zip(least).rev().filter(|(body, _)| body.link != 0) {
-        if !may_be_nearer(least, best.distance + body.radius + targets.around_max()) {
-            continue;
-        }
-        let gaps = targets.squared_gaps(&body.centre, &body.half);
-        for (chunk, gaps) in gaps.chunks(CHUNK).enumerate() {
-            let reach = best.distance + body.radius + targets.around_max();
-            let squared = reach.max(0.0).powi(2);
-            if !gaps.iter().fold(false, |any, gap| any | (*gap <= squared)) {
-                continue;
-            }
-            for (lane, gap) in gaps.iter().enumerate() {
-                let index = chunk * CHUNK + lane;
-                let Some(obstacle) = targets.all().get(index) else { break };
-                let reach = best.distance + body.radius + targets.around(index);
-                if may_be_nearer(*gap, reach) && !may_touch(body, obstacle) {
-                    check(arm, body, obstacle, enough, best);
-                    if best.distance <= enough {
-                        return;
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// Whether what lies in two boxes with this squared gap may be within `reach`. Where the boxes overlap
-/// there is no telling how deep.
-#[inline]
-fn may_be_nearer(squared_gap: f64, reach: f64) -> bool {
-    let reach = reach.max(0.0);
-    squared_gap <= reach * reach
-}
-
-#[inline]
-fn check(arm: &PlacedArm, body: &Placed, obstacle: &Obstacle, enough: f64, best: &mut Clearance) {
-    let wanted = Wanted { limit: best.distance, enough };
-    if let Some(near) = arm.near(body, obstacle, wanted) {
-        keep(best, &near, body.link, obstacle.id);
-    }
-}
-
-/// Two bodies of the arm; the one farther out is the first of the answer.
-#[inline]
-fn check_own(arm: &PlacedArm, first: &Placed, second: &Placed, enough: f64, best: &mut Clearance) {
-    if !may_be_nearer(first.squared_gap(second), best.distance + first.radius + second.radius) {
-        return;
-    }
-    let wanted = Wanted { limit: best.distance, enough };
-    if let Some(near) = arm.near_each_other(first, second, wanted) {
-        keep_own(best, &near, first, second);
-    }
-}
-
-pub(crate) fn keep_own(best: &mut Clearance, near: &Near, first: &Placed, second: &Placed) {
-    if second.link >= first.link {
-        keep(best, &near.swapped(), second.link, 0);
-    } else {
-        keep(best, near, first.link, 0);
-    }
-}
-
-#[inline]
-pub(crate) fn keep(best: &mut Clearance, near: &Near, link: usize, object: u32) {
-    // Whatever the order they are looked at in, of pairs equally near the same is named.
-    let nearer =
-        near.distance < best.distance || near.distance == best.distance && (link, object) < (best.link, best.object);
-    // A kernel that came to no number counts as a contact.
-    if nearer || near.distance.is_nan() {
-        *best = Clearance {
-            distance: if near.distance.is_nan() { f64::NEG_INFINITY } else { near.distance },
-            link,
-            object,
-            point_on_arm: near.on_first.into(),
-            point_on_other: near.on_second.into(),
-        };
-    }
-}
-
-pub(crate) fn nothing() -> Clearance {
-    Clearance { distance: f64::INFINITY, link: 0, object: 0, point_on_arm: [0.0; 3], point_on_other: [0.0; 3] }
-}
-
-pub(crate) fn contact() -> Clearance {
-    Clearance { distance: f64::NEG_INFINITY, ..nothing() }
-}
-
-fn lost() -> Separation {
-    Separation { distance: f64::NEG_INFINITY, ..Separation::NOBODY }
 }

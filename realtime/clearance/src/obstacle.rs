@@ -5,9 +5,10 @@ use core::fmt;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 use tandem_msg::{AttachedPart, Capsule, Pose, SCENE_OBJECTS_MAX, SceneObject, ShapeKind};
 
+use crate::hull::Hull;
 use crate::kernel::{Core, Near, OrientedBox, Wanted, core_to_core};
 use crate::mesh::Mesh;
-use crate::shapes::{Hull, Shapes};
+use crate::shapes::Shapes;
 
 /// Numbers past this, in metres, are taken for garbage.
 pub(crate) const FAR: f64 = 1e4;
@@ -153,6 +154,15 @@ impl Obstacle {
             Form::Box | Form::Cylinder { .. } | Form::Hull(_) | Form::Mesh(_) => {
                 (self.frame.centre, self.frame.half_in_base(), 0.0)
             }
+        }
+    }
+
+    /// Depths in it that are answered, though a shorter way may lead out along an axis of the base.
+    pub(crate) fn deepest(&self) -> f64 {
+        match self.form {
+            Form::Box | Form::Capsule { .. } | Form::Hull(_) => 0.0,
+            Form::Cylinder { radius, .. } => radius,
+            Form::Mesh(_) => f64::INFINITY,
         }
     }
 

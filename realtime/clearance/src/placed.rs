@@ -182,6 +182,25 @@ impl<'a> PlacedArm<'a> {
         }
     }
 
+    /// Of a hull: how far its capsule is from the obstacle, as a bound that is cheap.
+    #[inline]
+    pub(crate) fn apart_at_least(&self, body: &Placed, obstacle: &Obstacle) -> Option<f64> {
+        if !matches!(body.form, Form::Hull(_)) || !obstacle.is_quick() {
+            return None;
+        }
+        let capsule = Core::Segment(body.ends);
+        Some(obstacle.near(&capsule, body.radius, None, Wanted::ALL, self.shapes)?.distance)
+    }
+
+    /// Of two links, one or both a hull: how far their capsules are apart.
+    #[inline]
+    pub(crate) fn apart_at_least_each_other(&self, first: &Placed, second: &Placed) -> Option<f64> {
+        let [a, b] = [first, second].map(|body| Core::Segment(body.ends));
+        let hull = matches!(first.form, Form::Hull(_)) || matches!(second.form, Form::Hull(_));
+        let near = (hull && !first.is_part() && !second.is_part()).then(|| core_to_core(&a, &b, None, Wanted::ALL));
+        Some(near??.distance - first.radius - second.radius)
+    }
+
     /// Nearest points of a body (first) and an obstacle (second), or `None` when farther apart than wanted.
     #[inline]
     pub(crate) fn near(&self, body: &Placed, obstacle: &Obstacle, wanted: Wanted) -> Option<Near> {

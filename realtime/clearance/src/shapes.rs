@@ -8,7 +8,7 @@ use core::fmt;
 
 use nalgebra::Vector3;
 
-use crate::lanes::{Wide, wide};
+use crate::hull::Hull;
 use crate::mesh::Mesh;
 use crate::obstacle::FAR;
 
@@ -16,9 +16,6 @@ use crate::obstacle::FAR;
 pub const HULL_POINTS_MAX: usize = 256;
 /// Triangles a mesh may have.
 pub const MESH_TRIANGLES_MAX: usize = 65_536;
-
-/// Points that one step of the search looks at side by side.
-const LANES: usize = 8;
 
 /// Why points make no shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,83 +56,6 @@ impl fmt::Display for ShapeError {
 }
 
 impl core::error::Error for ShapeError {}
-
-/// The convex hull of some points, about the middle of the box around them.
-#[derive(Clone, Debug)]
-pub(crate) struct Hull {
-    /// Coordinates of `LANES` points side by side; the last block is filled up with its first point.
-    blocks: Vec<[[f64; LANES]; 3]>,
-    /// Middle of the box in the frame the points were given in.
-    pub(crate) centre: Vector3<f64>,
-    pub(crate) half: Vector3<f64>,
-}
-
-impl Hull {
-    fn of(points: &[[f64; 3]]) -> Result<Self, ShapeError> {
-        if !(4..=HULL_POINTS_MAX).contains(&points.len()) {
-            return Err(ShapeError::HullPoints { count: points.len() });
-        }
-        let (centre, half) = middle_of(points)?;
-        let blocks = points
-            .chunks(LANES)
-            .map(|chunk| {
-                core::array::from_fn(|axis| {
-                    core::array::from_fn(|lane| chunk.get(lane).unwrap_or(&chunk[0])[axis] - centre[axis])
-                })
-            })
-            .collect();
-        Ok(Self { blocks, centre, half })
-    }
-
-    /// A point that lies farthest along `direction`: all are looked at, so no point of the hull lies farther.
-    pub(crate) fn support(&self, direction: &Vector3<f64>) -> Vector3<f64> {
-        let blocks = &self.blocks[..];
-        let (farthest, places) = wide(Farthest { blocks, direction: [direction.x, direction.y, direction.z] });
-        let mut lane = 0;
-        for other in 1..LANES {
-            if farthest[other] > farthest[lane] {
-                lane = other;
-            }
-        }
-        let [xs, ys, zs] = &blocks[places[lane]];
-        Vector3::new(xs[lane], ys[lane], zs[lane])
-    }
-
-    /// The points in the frame they were given in.
-    pub(crate) fn points(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        let of_block = |block: &[[f64; LANES]; 3]| {
-            let [xs, ys, zs] = *block;
-            (0..LANES).map(move |lane| Vector3::new(xs[lane], ys[lane], zs[lane]))
-        };
-        self.blocks.iter().flat_map(of_block).map(|point| point + self.centre)
-    }
-}
-
-/// The farthest point along a direction in each lane: how far, and its block.
-struct Farthest<'a> {
-    blocks: &'a [[[f64; LANES]; 3]],
-    direction: [f64; 3],
-}
-
-impl Wide for Farthest<'_> {
-    type Output = ([f64; LANES], [usize; LANES]);
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        let [x, y, z] = self.direction;
-        let mut farthest = [f64::NEG_INFINITY; LANES];
-        let mut places = [0_usize; LANES];
-        for (place, [xs, ys, zs]) in self.blocks.iter().enumerate() {
-            for lane in 0..LANES {
-                let along = xs[lane] * x + ys[lane] * y + zs[lane] * z;
-                let farther = along > farthest[lane];
-                farthest[lane] = if farther { along } else { farthest[lane] };
-                places[lane] = if farther { place } else { places[lane] };
-            }
-        }
-        (farthest, places)
-    }
-}
 
 /// Middle and half extents of the box around some points.
 pub(crate) fn middle_of(points: &[[f64; 3]]) -> Result<(Vector3<f64>, Vector3<f64>), ShapeError> {

@@ -21,6 +21,8 @@ pub(crate) struct Targets<const N: usize> {
     /// Radius around the core.
     around: [f64; N],
     around_max: f64,
+    /// What is answered of an overlap may exceed that of the boxes up to this.
+    deepest: [f64; N],
 }
 
 impl<const N: usize> Targets<N> {
@@ -31,6 +33,7 @@ impl<const N: usize> Targets<N> {
         half: [[0.0; N]; 3],
         around: [0.0; N],
         around_max: 0.0,
+        deepest: [0.0; N],
     };
 
     pub(crate) fn clear(&mut self) {
@@ -50,6 +53,7 @@ impl<const N: usize> Targets<N> {
             }
             self.around[index] = around;
             self.around_max = self.around_max.max(around);
+            self.deepest[index] = obstacle.deepest();
             self.obstacles[index] = obstacle;
             self.count += 1;
         }
@@ -66,6 +70,14 @@ impl<const N: usize> Targets<N> {
     /// The largest of them.
     pub(crate) fn around_max(&self) -> f64 {
         self.around_max
+    }
+
+    /// What is answered of an obstacle's core and of one in a box along the base axes that overlaps its box is
+    /// no deeper than this: by that much along one axis, the boxes part.
+    pub(crate) fn depth_max(&self, index: usize, centre: &Vector3<f64>, half: &Vector3<f64>) -> f64 {
+        let overlap =
+            |axis: usize| self.half[axis][index] + half[axis] - (self.centre[axis][index] - centre[axis]).abs();
+        overlap(0).min(overlap(1)).min(overlap(2)).max(self.deepest[index])
     }
 
     /// Squared distances from a box along the base axes to the box around each obstacle's core.

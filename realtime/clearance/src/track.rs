@@ -10,7 +10,7 @@ use tandem_kinematics::{JOINTS_MAX, LinkPoses};
 use tandem_msg::SCENE_OBJECTS_MAX;
 
 use crate::kernel::{Near, Wanted};
-use crate::monitor::{contact, keep, keep_own, nothing, part_to_arm};
+use crate::nearest::{keep, keep_own, part_to_arm};
 use crate::placed::PlacedArm;
 use crate::{Clearance, LINK_CAPSULES_MAX, Monitor, SELF_PAIRS_MAX};
 
@@ -91,11 +91,11 @@ impl Monitor {
         let mut arm = PlacedArm::new(arm_body, part.as_ref(), poses, shapes.as_deref());
         if !arm.place() || !sound {
             recent.forget();
-            return contact();
+            return Clearance::CONTACT;
         }
         recent.follow(&arm, poses);
         let bodies = arm.bodies();
-        let mut best = nothing();
+        let mut best = Clearance::NOTHING;
         let mut nearest = (0, 0);
         // The distance of a pair, or what it is known to be above.
         let mut look = |body: usize, object: usize, best: &mut Clearance| {

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::gjk::{self, Wanted};
 use super::{Near, OrientedBox, box_to_box, point_to_segment, segment_to_cylinder, segment_to_segment};
-use crate::shapes::Hull;
+use crate::hull::Hull;
 
 /// A convex core where it is, base frame.
 #[derive(Clone, Copy)]
@@ -69,8 +69,8 @@ impl Core<'_> {
     /// Normals of faces the core is known to have; zero where there is none.
     pub(super) fn normals(&self) -> [Vector3<f64>; 3] {
         match self {
-            Self::Segment(_) => [Vector3::zeros(); 3],
-            Self::Box(frame) | Self::Cylinder { frame, .. } | Self::Hull { frame, .. } => {
+            Self::Segment(_) | Self::Hull { .. } => [Vector3::zeros(); 3],
+            Self::Box(frame) | Self::Cylinder { frame, .. } => {
                 [0, 1, 2].map(|axis| frame.axes.column(axis).into_owned())
             }
             Self::Triangle([a, b, c]) => {

@@ -38,18 +38,24 @@ impl Shallowest {
         }
         difference
     }
+
+    /// Tries the axes of the base by the boxes around both, which tell nearly as much as the cores.
+    fn part_boxes(&mut self, first: &Core, second: &Core) {
+        let between = second.centre() - first.centre();
+        let overlap = first.half_in_base() + second.half_in_base() - between.abs();
+        let axis = overlap.imin();
+        if overlap[axis] < self.depth {
+            let mut normal = Vector3::zeros();
+            normal[axis] = 1.0_f64.copysign(between[axis]);
+            *self = Self { depth: overlap[axis], normal, corner: first.support(&normal) };
+        }
+    }
 }
 
 /// Nearest points of two cores that overlap, with minus a depth that is at least the true one, or `None` when
 /// that is above `limit`. `corners` are those of the difference that hold the origin, as far as they are known.
 pub(super) fn of_overlap(first: &Core, second: &Core, corners: &[Corner], limit: f64) -> Option<Near> {
     let mut best = Shallowest { depth: f64::INFINITY, normal: Vector3::x(), corner: Vector3::zeros() };
-    for axis in 0..3 {
-        let mut normal = Vector3::zeros();
-        normal[axis] = 1.0;
-        best.look(first, second, normal);
-        best.look(first, second, -normal);
-    }
     if let Some(normal) = (first.centre() - second.centre()).try_normalize(1e-9) {
         best.look(first, second, -normal);
     }
@@ -59,11 +65,15 @@ pub(super) fn of_overlap(first: &Core, second: &Core, corners: &[Corner], limit:
             best.look(first, second, -normal);
         }
     }
+    best.part_boxes(first, second);
     if -best.depth > limit {
         return None;
     }
     if let Some(mut polytope) = Polytope::around(first, second, corners) {
-        polytope.grow(first, second, &mut best);
+        polytope.grow(first, second, limit, &mut best);
+    }
+    if -best.depth > limit {
+        return None;
     }
     let depth = best.depth.max(0.0);
     // The first leaves against the outward normal; the corner reaches deepest that way.
@@ -154,7 +164,8 @@ impl Polytope {
         self.face_count += 1;
     }
 
-    fn grow(&mut self, first: &Core, second: &Core, best: &mut Shallowest) {
+    /// Tries the normals of the polytope's nearest faces, until nothing is gained or the depth is of no interest.
+    fn grow(&mut self, first: &Core, second: &Core, limit: f64, best: &mut Shallowest) {
         for _ in 0..GROWTH {
             let faces = &self.faces[..self.face_count];
             let Some(nearest) = faces.iter().min_by(|a, b| a.distance.total_cmp(&b.distance)).copied() else { return };
@@ -162,7 +173,7 @@ impl Polytope {
                 return;
             }
             let corner = best.look(first, second, nearest.normal);
-            if best.depth - nearest.distance <= OPEN || !self.expand(corner) {
+            if best.depth - nearest.distance <= OPEN || -best.depth > limit || !self.expand(corner) {
                 return;
             }
         }

@@ -27,6 +27,9 @@ pub(crate) struct Wanted {
 }
 
 impl Wanted {
+    /// The distance, whatever it is.
+    pub(crate) const ALL: Self = Self { limit: f64::INFINITY, enough: f64::NEG_INFINITY };
+
     /// The same question about cores that are padded by `radius` in all.
     #[inline]
     pub(crate) fn of_cores(self, radius: f64) -> Self {

@@ -6,6 +6,7 @@
 #![allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
 
 mod contacts;
+#[path = "../reference/mod.rs"]
 mod reference;
 mod single;
 

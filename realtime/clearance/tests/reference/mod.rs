@@ -2,14 +2,20 @@
 //!
 //! UR5 and Panda of the public package `example-robot-data` 6.0.0: the convex hull of each link's collision
 //! mesh, the least capsule around it, and the pairs of links that their SRDF leaves to be checked.
-//! Scenes of 11 to 50 obstacles, a person of ten capsules among them.
+//! Scenes of 11 to 50 obstacles, a person of ten capsules among them. Tests and benches include this by its path.
+
+#![allow(dead_code, reason = "who includes this uses some of it")]
+
+#[path = "../../../kinematics/tests/reference/mod.rs"]
+mod kinematics;
 
 use std::path::Path;
 use std::sync::Arc;
 
-use nalgebra::{Isometry3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use kinematics::{chain_within, fields};
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use tandem_clearance::{ArmBody, LinkCapsule, Monitor, Shapes};
-use tandem_kinematics::{Chain, JOINTS_MAX, Joint, JointKind};
+use tandem_kinematics::{Chain, JOINTS_MAX};
 use tandem_msg::{Capsule, Pose, SceneObject, ShapeKind};
 
 /// What stands for the links of the arm.
@@ -28,46 +34,24 @@ pub(crate) struct Robot {
     pub(crate) names: Vec<String>,
     pub(crate) hulls: Vec<Vec<[f64; 3]>>,
     pub(crate) self_pairs: Vec<[usize; 2]>,
-    scene_rows: Vec<Vec<String>>,
+    pub(crate) scene_rows: Vec<Vec<String>>,
 }
 
+/// Fields of a file of these tests but for its headline.
 pub(crate) fn rows(file: &str) -> Vec<Vec<String>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file);
-    let text = std::fs::read_to_string(&path).expect("reference data is beside the test");
-    text.lines().skip(1).map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    fields(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../clearance/tests/data")), file)
 }
 
 pub(crate) fn numbers(fields: &[String]) -> Vec<f64> {
     fields.iter().map(|field| field.parse().unwrap_or_else(|_| panic!("{field} is a number"))).collect()
 }
 
-fn pose(n: &[f64]) -> Isometry3<f64> {
-    let rotation = UnitQuaternion::from_quaternion(Quaternion::new(n[6], n[3], n[4], n[5]));
-    Isometry3::from_parts(Translation3::new(n[0], n[1], n[2]), rotation)
-}
-
 pub(crate) fn robots() -> [Robot; 2] {
     [robot("ur5", 6), robot("panda", 7)]
 }
 
-fn robot(name: &'static str, joints: usize) -> Robot {
-    let chain = rows(&format!("{name}_chain.csv"));
-    let (tool, moving) = chain.split_last().expect("the tool is the last row");
-    let joint = |row: &Vec<String>| {
-        let n = numbers(&row[1..]);
-        Joint {
-            kind: JointKind::Revolute,
-            parent_from_joint: pose(&n[..7]),
-            axis: Unit::new_normalize(Vector3::new(n[7], n[8], n[9])),
-            position_min: n[10],
-            position_max: n[11],
-            velocity_max: n[12],
-            acceleration_max: 10.0,
-            jerk_max: 100.0,
-            effort_max: 100.0,
-        }
-    };
-    let moving: Vec<Joint> = moving.iter().map(joint).collect();
+pub(crate) fn robot(name: &'static str, joints: usize) -> Robot {
+    let chain = chain_within(name, f64::INFINITY);
     let (mut names, mut capsules) = (Vec::new(), Vec::new());
     for row in rows(&format!("{name}_capsules.csv")) {
         let n = numbers(&row[1..]);
@@ -83,7 +67,6 @@ fn robot(name: &'static str, joints: usize) -> Robot {
     }
     let pairs = rows(&format!("{name}_self_pairs.csv"));
     let self_pairs = pairs.iter().map(|row| [&row[0], &row[1]].map(|name| capsules[of_link(name)].link)).collect();
-    let chain = Chain::new(&moving, pose(&numbers(&tool[1..]))).expect("a reference robot is a chain");
     let scene_rows = rows(&format!("{name}_scenes.csv"));
     Robot { name, joints, chain, capsules, names, hulls, self_pairs, scene_rows }
 }
