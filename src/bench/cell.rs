@@ -154,8 +154,8 @@ impl LiveCell {
     ///
     /// # Errors
     /// It does not come, or the cell ends before.
-    pub(super) fn wait_for(&self, event: &str, wanted: impl Fn(&Value) -> bool) -> Result<(), BenchError> {
-        until(&self.events, event, |told| told["event"] == event && wanted(told)).map(drop)
+    pub(super) fn wait_for(&self, event: &str, wanted: impl Fn(&Value) -> bool) -> Result<Value, BenchError> {
+        until(&self.events, event, |told| told["event"] == event && wanted(told))
     }
 
     /// Waits until every role that can be replaced has a spare that is ready.

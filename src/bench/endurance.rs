@@ -112,7 +112,7 @@ fn live(file: &Path, cell: &Cell, cycles: u64, options: &Options, report: &mut R
     let grid = grid(schedule.phase + schedule.period / 2)?;
     let (first, first_of_plant) = (snapshot(&controller), snapshot(&plant));
     let mut parts = vec![first.clone()];
-    let (states, applied) = loops::set_up(None, &mut report.conditions, || {
+    let heard = loops::set_up(None, &mut report.conditions, || {
         let node = seat.join();
         let mut arm = node.latest::<JointState>(service::ARM_STATE)?;
         let (mut states, mut applied) = (Chain::default(), Chain::default());
@@ -121,6 +121,9 @@ fn live(file: &Path, cell: &Cell, cycles: u64, options: &Options, report: &mut R
             let end = first.record.cycles + cycles * part / PARTS as u64;
             while controller.cycles() < end {
                 rate.wait();
+                if controller.epoch() != first.epoch {
+                    return Ok(None);
+                }
                 let state = arm.read();
                 // A state that was not heard says nothing about the command it answered to.
                 let follows = state.header.seq == states.last + 1;
@@ -134,8 +137,12 @@ fn live(file: &Path, cell: &Cell, cycles: u64, options: &Options, report: &mut R
             parts.push(snapshot(&controller));
             (options.tell)(&format!("{part} of {PARTS}: {} cycles", controller.cycles() - first.record.cycles));
         }
-        Ok::<_, BenchError>((states, applied))
+        Ok::<_, BenchError>(Some((states, applied)))
     })??;
+    let Some((states, applied)) = heard else {
+        let told = running.wait_for("fault", |_| true)?;
+        return Err(BenchError::peer("the live cell", format!("did not endure: {told}")));
+    };
     // A number is published a cycle, from the first on: what was published and what was counted is the same.
     let node = seat.join();
     let mut command = node.latest::<JointCommand>(service::ARM_COMMAND)?;
@@ -153,8 +160,6 @@ fn live(file: &Path, cell: &Cell, cycles: u64, options: &Options, report: &mut R
     let (last, last_of_plant) = (snapshot(&controller), snapshot(&plant));
     report.finding("commands published less cycles run", commands, Some(0.0), "");
     report.finding("states of the arm published less cycles run", measured, Some(0.0), "");
-    let anew = last.epoch - first.epoch + last_of_plant.epoch - first_of_plant.epoch;
-    report.finding("controllers and plants started anew", anew as f64, Some(0.0), "");
     let late = passed_over(&first, &last) + passed_over(&first_of_plant, &last_of_plant);
     report.finding("grid points missed and cycles late, both loops", late as f64, None, "");
     report.finding("commands passed over by the plant", applied.lost as f64, Some(late as f64), "");

@@ -39,24 +39,24 @@ pub(super) fn huge_pages(host: &Host) -> Check {
     }
 }
 
-/// Balancing between memories and merging of equal pages take pages away while a loop uses them.
+/// Balancing between memories, merging of equal pages and compaction take pages away while a loop uses them; the last
+/// also pages that are locked.
 pub(super) fn page_moving(host: &Host) -> Check {
     let it = Subject("page_moving", "a page that the kernel moves or merges faults when a loop touches it next");
-    let balancing = host.number("proc/sys/kernel/numa_balancing").is_some_and(|on| on != 0);
-    let merging = host.number("sys/kernel/mm/ksm/run") == Some(1);
-    let fixes: Vec<&str> = [
-        balancing.then_some("sysctl -w kernel.numa_balancing=0"),
-        merging.then_some("echo 2 > /sys/kernel/mm/ksm/run"),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
-    match (balancing, merging) {
-        (false, false) => it.ok("none"),
-        (true, false) => it.degraded("NUMA balancing", fixes.join("; ")),
-        (false, true) => it.degraded("merging of equal pages", fixes.join("; ")),
-        (true, true) => it.degraded("NUMA balancing, merging of equal pages", fixes.join("; ")),
-    }
+    let is_on = |path| host.number(path).is_some_and(|on| on != 0);
+    let movers = [
+        (is_on("proc/sys/kernel/numa_balancing"), "NUMA balancing", "sysctl -w kernel.numa_balancing=0"),
+        (host.number("sys/kernel/mm/ksm/run") == Some(1), "merging of equal pages", "echo 2 > /sys/kernel/mm/ksm/run"),
+        (
+            is_on("proc/sys/vm/compact_unevictable_allowed"),
+            "compaction of locked pages",
+            "sysctl -w vm.compact_unevictable_allowed=0",
+        ),
+    ];
+    let active = || movers.iter().filter(|(active, ..)| *active);
+    let what: Vec<&str> = active().map(|(_, what, _)| *what).collect();
+    let fixes: Vec<&str> = active().map(|(.., fix)| *fix).collect();
+    if what.is_empty() { it.ok("none") } else { it.degraded(what.join(", "), fixes.join("; ")) }
 }
 
 pub(super) fn swap(host: &Host) -> Check {

@@ -138,6 +138,9 @@ const BREAKS: &[Break] = {
         }),
         ("page_moving", Degraded, "NUMA balancing", |f| f.write("proc/sys/kernel/numa_balancing", "1\n")),
         ("page_moving", Degraded, "merging of equal pages", |f| f.write("sys/kernel/mm/ksm/run", "1\n")),
+        ("page_moving", Degraded, "compaction of locked pages", |f| {
+            f.write("proc/sys/vm/compact_unevictable_allowed", "1\n");
+        }),
         ("swap", Degraded, "/dev/sda2, /swapfile", |f| {
             f.write("proc/swaps", "Filename Type\n/dev/sda2 partition 1 0 -2\n/swapfile file 1 0 -3\n");
         }),

@@ -12,6 +12,8 @@ use std::time::{Duration, Instant};
 
 use tandem_cycle::stats::Reader;
 
+/// Periods are taken to be at least that long.
+const PERIOD_MIN: Duration = Duration::from_millis(1);
 /// Silence after which a loop is looked into, in periods.
 const SUSPECT: u32 = 3;
 /// After which one that is stopped is judged: it was at both looks.
@@ -49,9 +51,10 @@ pub(super) struct Pulse {
 }
 
 impl Pulse {
-    /// Of a loop of that period.
+    /// Of a loop of that period. A faster one than 1 kHz is given the time of one at 1 kHz: what takes the whole machine
+    /// for a millisecond or two is not its fault.
     pub(super) fn new(period: Duration, now: Instant) -> Self {
-        Self { period, last: (0, 0), since: now, suspected: None }
+        Self { period: period.max(PERIOD_MIN), last: (0, 0), since: now, suspected: None }
     }
 
     /// Whether the process `pid` is to be killed, at `now`: it is stopped, or spins without a cycle.

@@ -201,17 +201,16 @@ impl Warden {
         let due = |at: Option<Instant>| at.is_some_and(|at| at <= now);
         for place in &mut self.places {
             if due(place.start_at) {
-                match place.replace(&self.plan) {
-                    Ok(epoch) => self.reports.send(Report::Started { role: place.role, epoch }),
+                let role = place.role;
+                // Without a supervisor nobody needs to know.
+                let _ = match place.replace(&self.plan) {
+                    Ok(epoch) => self.reports.send(Report::Started { role, epoch }),
                     Err(cause) => {
-                        let role = place.role;
                         let last_words = format!("its process could not be started: {cause}");
                         let _ = self.reports.send(Report::Lost { role, loss: Loss::NeverReady, last_words });
                         self.reports.send(Report::GivenUp { role })
                     }
-                }
-                // Without a supervisor nobody needs to know.
-                .unwrap_or_default();
+                };
             }
             if due(place.spare_at) {
                 place.spare_at = None;

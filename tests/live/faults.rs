@@ -17,12 +17,13 @@ fn speaks_of<'a>(event: &'a str, role: &'a str) -> impl Fn(&Value) -> bool + 'a 
 
 /// Strikes a role while the arm moves; the cell must say what happened to it and have it back.
 fn recovers(cell: &mut LiveCell, place: &Place, role: &str, signal: Signal, fault: &str) {
-    let struck = only(place, role);
+    let (struck, spare) = (only(place, role), place.spare(role));
     kill_process(struck, signal).expect("it runs");
     let told = cell.until("the fault", speaks_of("fault", role));
     assert!(told["fault"].as_str().is_some_and(|word| word.contains(fault)), "{told}");
     cell.until("the recovery", speaks_of("recovered", role));
-    assert_ne!(only(place, role), struck, "another process has taken its place");
+    assert_ne!(spare, struck);
+    assert_eq!(only(place, role), spare, "who stood by has taken its place");
 }
 
 /// `kill -9` of controller and perception, one after the other, and a controller that is stopped but not dead: each is

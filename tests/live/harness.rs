@@ -103,6 +103,23 @@ impl Place {
         self.processes().into_iter().filter(|(_, name)| named(name)).map(|(pid, _)| pid).collect()
     }
 
+    /// Waits for the process that stands by for a role.
+    pub(crate) fn spare(&self, role: &str) -> Pid {
+        let start = Instant::now();
+        loop {
+            let waits = |pid: &Pid| {
+                let command = fs::read(format!("/proc/{}/cmdline", pid.as_raw_nonzero())).unwrap_or_default();
+                command.split(|byte| *byte == 0).any(|word| word == role.as_bytes())
+            };
+            let mut spares = self.processes().into_iter().filter(|(_, name)| name == "spare").map(|(pid, _)| pid);
+            if let Some(pid) = spares.find(waits) {
+                return pid;
+            }
+            assert!(start.elapsed() < PATIENCE, "nobody stands by for the {role}");
+            std::thread::yield_now();
+        }
+    }
+
     /// Waits until every role process here has gone, and says whether they have.
     pub(crate) fn is_deserted(&self) -> bool {
         let start = Instant::now();
