@@ -114,6 +114,11 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         root.refuse("strategies", &found, "at least one of each", "list the files of config/strategies");
     }
 
+    let (mut perception, product) = (perception, product?);
+    // A product that was transferred to is recognised by its own model.
+    if let (Some(perception), Some(model)) = (&mut perception, &product.model) {
+        perception.model.clone_from(model);
+    }
     Some(Cell {
         name: name?,
         file: path.to_owned(),
@@ -128,7 +133,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         perception: perception?,
         supervisor: supervisor?,
         store,
-        product: product?,
+        product,
         reference,
         strategies,
     })
@@ -240,7 +245,7 @@ fn read_product(
         let found = format!("\"{}\"", properties.display());
         reading.open(&properties, Some(table.fault_at("properties", &found, "a JSON file", "")))
     });
-    Some(product::read(&table, properties.as_ref(), layout, reading))
+    Some(product::read(&table, folder, properties.as_ref(), layout, reading))
 }
 
 /// Reads the strategy files: all reference rows first, for the strategies refer to them.

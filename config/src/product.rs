@@ -7,6 +7,7 @@ use crate::read::{Bound, Document, Reading, Table, bound};
 use nalgebra::Isometry3;
 use serde::Deserialize;
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 const MASS: Bound = bound("mass_kg", "kg", 0.001, 100.0);
 const GRASP_WIDTH: Bound = bound("grasp_width_m", "m", 0.0, 0.2);
@@ -79,6 +80,8 @@ pub struct Product {
     pub name: String,
     /// Name on the screen.
     pub label: String,
+    /// Folder of the model that recognises its parts, where it is not the cell's.
+    pub model: Option<PathBuf>,
     /// Part types; every part's `after` lies before it.
     pub parts: Vec<Part>,
 }
@@ -114,12 +117,19 @@ fn read_properties(document: &Document, reading: &Reading) -> BTreeMap<String, P
     })
 }
 
-/// Reads `root` as a product made in `layout`, with the properties beside it.
-pub(crate) fn read(root: &Table<'_>, properties: Option<&Document>, layout: &Layout, reading: &Reading) -> Product {
+/// Reads `root`, of a file in `folder`, as a product made in `layout`, with the properties beside it.
+pub(crate) fn read(
+    root: &Table<'_>,
+    folder: &Path,
+    properties: Option<&Document>,
+    layout: &Layout,
+    reading: &Reading,
+) -> Product {
     let known = properties.map(|document| (document, read_properties(document, reading)));
     let mut product = Product {
         name: root.text("name").unwrap_or_default(),
         label: root.text("label").unwrap_or_default(),
+        model: root.text_if("model").map(|model| crate::cell::beside(folder, &model)),
         parts: Vec::new(),
     };
     let tables = root.tables("part");

@@ -19,7 +19,7 @@ use tandem_trajectory::{Generator, Input, Limits, State};
 use super::rehearsal::{Rehearsal, Rests};
 use super::series::histogram;
 use super::{BenchError, Options, Report, Series, loops};
-use crate::learning::encoder::{Split, example};
+use crate::learning::encoder::{Domain, Split, example};
 use crate::perception::{Perception, Sampler};
 
 const FORWARD: &str = "forward kinematics";
@@ -196,7 +196,7 @@ fn recognitions(cell: &Cell, time: Duration, seed: u64) -> Result<Histogram<u64>
     let clouds: Vec<Vec<[f32; 3]>> = (0..classes)
         .map(|index| {
             let mut cloud = Vec::new();
-            example(seed, Split::Test, index, &mut sampler, &mut cloud);
+            example(&Domain::source(), seed, Split::Test, index, &mut sampler, &mut cloud);
             cloud
         })
         .collect();

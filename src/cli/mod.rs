@@ -20,6 +20,7 @@ mod status;
 mod table;
 mod top;
 mod train;
+mod transfer;
 
 use std::process::ExitCode;
 

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
-use super::exit;
+use super::{exit, transfer};
 use crate::learning::encoder::{self, TrainOptions, TrainProgress};
 
 #[derive(Args)]
@@ -19,6 +19,10 @@ pub(super) struct TrainArgs {
 enum What {
     /// The encoder-decoder that recognises assembly features, on generated parts
     Encoder(EncoderArgs),
+    /// That encoder brought to the parts of another product, with few labels or none
+    Transfer(transfer::TransferArgs),
+    /// The agent that chooses the moves of a transfer, on shifts that are made up
+    Agent(transfer::AgentArgs),
 }
 
 #[derive(Args)]
@@ -47,7 +51,14 @@ struct EncoderArgs {
 }
 
 pub(super) fn train(args: &TrainArgs) -> u8 {
-    let What::Encoder(args) = &args.what;
+    match &args.what {
+        What::Encoder(args) => train_encoder(args),
+        What::Transfer(args) => transfer::transfer(args),
+        What::Agent(args) => transfer::agent(args),
+    }
+}
+
+fn train_encoder(args: &EncoderArgs) -> u8 {
     let options = TrainOptions {
         samples: args.samples,
         epochs: args.epochs,

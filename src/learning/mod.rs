@@ -1,3 +1,4 @@
 //! What is learned before a cell runs.
 
 pub mod encoder;
+pub mod transfer;

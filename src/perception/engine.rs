@@ -258,6 +258,13 @@ impl Engine {
     }
 }
 
+impl Engine {
+    /// Features of the cloud seen last: largest and mean of each channel over its tokens.
+    pub(crate) fn features(&self) -> &[f32] {
+        &self.room.cloud
+    }
+}
+
 /// Adds the bias and cuts at zero.
 struct Rectified<'a> {
     out: &'a mut [f32],

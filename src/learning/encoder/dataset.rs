@@ -7,8 +7,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use tandem_config::FeatureGeometry;
-use tandem_msg::{CLOUD_POINTS, Coded, FeatureClass};
+use tandem_msg::{CLOUD_POINTS, FeatureClass};
 
+use super::domain::Domain;
 use super::specimen::Specimen;
 use crate::perception::sight::{Ball, Cut, ball};
 use crate::perception::{Sample, Sampler};
@@ -60,27 +61,47 @@ const SHOWN_MIN: usize = 24;
 const MISPLACED: f32 = 0.08;
 const MISJUDGED: [f32; 2] = [0.85, 1.3];
 
-/// Example `index` of a split; classes follow each other in turn. The cloud (metres, camera
+/// Example `index` of a split of a domain. The cloud (metres, camera
 /// frame) is left in `cloud`.
 ///
 /// Draws again, from the same stream, when hardly anything of the part came into view.
-pub fn example(seed: u64, split: Split, index: u64, sampler: &mut Sampler, cloud: &mut Vec<[f32; 3]>) -> Example {
-    // One generator a seed and split, one stream an example: no two share numbers.
-    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(4).wrapping_add(split as u64));
+pub fn example(
+    domain: &Domain,
+    seed: u64,
+    split: Split,
+    index: u64,
+    sampler: &mut Sampler,
+    cloud: &mut Vec<[f32; 3]>,
+) -> Example {
+    // One generator a domain, seed and split, one stream an example: no two share numbers.
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(4).wrapping_add(split as u64) ^ domain.stream);
     rng.set_stream(index);
-    let class = FeatureClass::ALL[(index % FeatureClass::ALL.len() as u64) as usize];
+    let class = domain.class(index);
     let (mut on_feature, mut on_body) = (Vec::with_capacity(CLOUD_POINTS), Vec::with_capacity(CLOUD_POINTS));
     loop {
-        let specimen = Specimen::draw(class, &mut rng);
+        let specimen = Specimen::draw(domain, index, &mut rng);
         let view: View<'_> = specimen.view();
         cloud.clear();
         on_feature.clear();
         on_body.clear();
-        specimen.camera.render(&view, CLOUD_POINTS, &mut rng, |p, m| {
+        let points = domain.scanner.map_or(CLOUD_POINTS, |s| rng.random_range(s.points[0]..=s.points[1]));
+        specimen.camera.render(&view, points, &mut rng, |p, m| {
             cloud.push(p);
             on_feature.push(m == Material::Feature);
             on_body.push(m == Material::Body);
         });
+        if let Some(scanner) = &domain.scanner {
+            let mut read = scanner.draw(specimen.half_width, specimen.focus, &mut rng);
+            let mut kept = 0;
+            for i in 0..cloud.len() {
+                let Some(p) = read(cloud[i], &mut rng) else { continue };
+                (cloud[kept], on_feature[kept], on_body[kept]) = (p, on_feature[i], on_body[i]);
+                kept += 1;
+            }
+            cloud.truncate(kept);
+            on_feature.truncate(kept);
+            on_body.truncate(kept);
+        }
         let mut sample = Sample::default();
         if !sampler.sample(cloud, &mut sample) {
             continue;
@@ -143,6 +164,7 @@ fn place(
 
 /// The first `count` examples of a split, made by `threads` threads; `made` hears how many there are.
 pub(crate) fn examples(
+    domain: &Domain,
     seed: u64,
     split: Split,
     count: usize,
@@ -158,7 +180,7 @@ pub(crate) fn examples(
                 return out;
             }
             made(index);
-            out.push((index, example(seed, split, index as u64, &mut sampler, &mut cloud)));
+            out.push((index, example(domain, seed, split, index as u64, &mut sampler, &mut cloud)));
         }
     };
     let mut all: Vec<(usize, Example)> = std::thread::scope(|scope| {

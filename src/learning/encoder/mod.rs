@@ -4,16 +4,18 @@
 //! camera and samples the clouds exactly as perception does, [`mod@train`] fits the network
 //! and measures it on parts it never saw.
 
-mod adam;
-mod augment;
-mod dataset;
-mod parameters;
-mod pass;
-mod report;
+pub(crate) mod adam;
+pub(crate) mod augment;
+pub(crate) mod dataset;
+mod domain;
+pub(crate) mod parameters;
+pub(crate) mod pass;
+pub(crate) mod report;
 mod specimen;
-mod train;
+pub(crate) mod train;
 
 pub use dataset::{Example, Look, Split, example};
+pub use domain::{Domain, Kind, Scanner};
 pub use report::measure;
 pub use specimen::Specimen;
 pub use train::{TrainError, TrainOptions, TrainProgress, train};

@@ -6,6 +6,7 @@ use nalgebra::Vector3;
 use tandem_msg::{Coded, FEATURE_CLASSES, FeatureClass, FeatureDimensions};
 
 use super::dataset::{Example, Split, example};
+use super::domain::Domain;
 use super::train::TrainError;
 use crate::perception::card::Metrics;
 use crate::perception::engine::Engine;
@@ -62,12 +63,18 @@ const WRONG_MAX: f64 = 0.025;
 /// Calibrates on the validation split: the temperature and the weight of the winding with the
 /// least negative log-likelihood, then the smallest probability above which at most one
 /// answer in forty is wrong.
-pub(crate) fn calibrate(folder: &Path, seed: u64, count: usize, card: &mut Card) -> Result<(), TrainError> {
+pub(crate) fn calibrate(
+    folder: &Path,
+    domain: &Domain,
+    seed: u64,
+    count: usize,
+    card: &mut Card,
+) -> Result<(), TrainError> {
     let mut perception = Perception::load(folder)?;
     let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
     let mut cases = Vec::with_capacity(count);
     for index in 0..count as u64 {
-        let truth = example(seed, Split::Validation, index, &mut sampler, &mut cloud);
+        let truth = example(domain, seed, Split::Validation, index, &mut sampler, &mut cloud);
         let Some(seen) = perception.see(&cloud) else { continue };
         let Some(class) = class_of(&seen.logits()) else { continue };
         let winding = seen.fit(&cloud, class).and_then(|fit| fit.winding);
@@ -123,22 +130,22 @@ fn threshold(cases: &[([f32; FEATURE_CLASSES], usize)], temperature: f64) -> f64
 ///
 /// # Errors
 /// [`TrainError::Model`] when the model is refused.
-pub fn measure(folder: &Path, seed: u64, count: usize) -> Result<Metrics, TrainError> {
+pub fn measure(folder: &Path, domain: &Domain, seed: u64, count: usize) -> Result<Metrics, TrainError> {
     let mut perception = Perception::load(folder)?;
     let threshold = perception.card().threshold;
     let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
     let mut tally = Tally::default();
     for index in 0..count as u64 {
-        let truth = example(seed, Split::Test, index, &mut sampler, &mut cloud);
+        let truth = example(domain, seed, Split::Test, index, &mut sampler, &mut cloud);
         let Some(recognised) = perception.recognise(&cloud) else { continue };
         tally.add(&truth, perception.sight(), &recognised, threshold);
     }
     Ok(tally.metrics())
 }
 
-/// Sums over the test split.
+/// Sums over a test split.
 #[derive(Default)]
-struct Tally {
+pub(crate) struct Tally {
     count: f64,
     confusion: [[u32; FEATURE_CLASSES]; FEATURE_CLASSES],
     sure: f64,
@@ -157,7 +164,7 @@ struct Tally {
 }
 
 impl Tally {
-    fn add(&mut self, truth: &Example, seen: &Sight, answer: &Recognised, threshold: f64) {
+    pub(crate) fn add(&mut self, truth: &Example, seen: &Sight, answer: &Recognised, threshold: f64) {
         self.count += 1.0;
         let right = answer.class == truth.class;
         self.confusion[truth.class.code() as usize][answer.class.code() as usize] += 1;
@@ -214,7 +221,7 @@ impl Tally {
         }
     }
 
-    fn metrics(mut self) -> Metrics {
+    pub(crate) fn metrics(mut self) -> Metrics {
         let right: u32 = (0..FEATURE_CLASSES).map(|c| self.confusion[c][c]).sum();
         let count = self.count.max(1.0);
         let calibration = self.bins.iter().map(|[_, p, r]| (p - r).abs()).sum::<f64>() / count;

@@ -12,22 +12,14 @@ use rand_chacha::ChaCha8Rng;
 use tandem_config::{Body, FeatureGeometry};
 use tandem_msg::FeatureClass;
 
+use super::domain::{Domain, Kind};
 use crate::plant::camera::{Camera, View, extent, feature_from_camera};
 use crate::plant::solid::{Clutter, Form, Other, Solid, Surroundings};
 
 /// Smallest and largest feature, metres.
 const SIZE: [f64; 2] = [0.004, 0.045];
-/// Tilt of the view off the feature's axis, radians: straight from above a bore shows no wall.
-const TILT: [f64; 2] = [0.22, 0.70];
-/// Half the view in extents of the feature.
-const VIEW: [f64; 2] = [1.1, 2.1];
-/// How far off the feature the camera may be aimed, in half widths of the view.
-const AIM: f64 = 0.28;
 /// Turns of a thread there are at least: less is a groove.
 const TURNS_MIN: f64 = 2.5;
-/// Range noise in half widths of the view, and its limits in metres.
-const NOISE: [f64; 2] = [0.001, 0.0055];
-const NOISE_LIMITS: [f64; 2] = [20e-6, 250e-6];
 
 /// A part, what lies around it, and how it is looked at.
 #[derive(Clone, Debug)]
@@ -49,29 +41,24 @@ pub struct Specimen {
 }
 
 impl Specimen {
-    /// Draws a specimen of a class.
-    pub fn draw(class: FeatureClass, rng: &mut ChaCha8Rng) -> Self {
-        let (mut feature, form) = feature(class, rng);
-        // A bare surface is looked at as closely as anything else.
-        let size = match (class, form.other) {
-            (FeatureClass::Other, Other::Bare) => log_uniform(SIZE, rng),
-            (FeatureClass::Other, Other::Block(size, _)) => size[0].max(size[1]).max(size[2]),
-            (FeatureClass::Other, Other::Dome(diameter, _)) => diameter,
-            _ => extent(&feature),
+    /// Draws specimen `index` of a domain.
+    pub fn draw(domain: &Domain, index: u64, rng: &mut ChaCha8Rng) -> Self {
+        let kind = match domain.kinds.len() as u64 {
+            0 => kind(domain.class(index), rng),
+            count => domain.kinds[(index % count) as usize].scaled(log_uniform(domain.scale, rng)),
         };
-        let aligned = rng.random_bool(0.5);
-        let room = room(&feature, size, aligned);
-        let (body, top, at) = body(&mut feature, size, room, rng);
-        // Along the body's edges, or in any direction.
-        let turn = if aligned { 0.0 } else { rng.random_range(0.0..TAU) };
-        let part_from_feature = Isometry3::from_parts(Translation3::new(at[0], at[1], top), about_z(turn));
+        let Kind { feature, form, body, part_from_feature, size } = kind;
+        let class = feature.class;
         let solid = Solid::with_form(&body, &feature, &form, &part_from_feature);
 
-        let mut half_width = size * log_uniform(VIEW, rng);
-        let sigma = (half_width * log_uniform(NOISE, rng)).clamp(NOISE_LIMITS[0], NOISE_LIMITS[1]);
-        let camera =
-            Camera { range_sigma: sigma, dropout: rng.random_range(0.0..0.08), outliers: rng.random_range(0.0..0.008) };
-        let mut reach = AIM * half_width;
+        let mut half_width = size * log_uniform(domain.view, rng);
+        let sigma = (half_width * log_uniform(domain.noise, rng)).clamp(domain.noise_limits[0], domain.noise_limits[1]);
+        let camera = Camera {
+            range_sigma: sigma,
+            dropout: rng.random_range(0.0..domain.dropout),
+            outliers: rng.random_range(0.0..domain.outliers),
+        };
+        let mut reach = domain.aim * half_width;
         if class == FeatureClass::Slot {
             // Mostly both its ends are in view.
             half_width = half_width.max(0.55 * feature.length);
@@ -82,8 +69,9 @@ impl Specimen {
         let focus = rng.random_range(0.25..0.5);
 
         // A part mostly stands on its carrier, feature up; now and then it lies on its side.
-        let lying = !matches!(body, Body::Tray { .. } | Body::Ring { .. })
+        let lying = !matches!(body, Body::Tray { .. } | Body::Ring { .. } | Body::Cable { .. })
             && rng.random_bool(if class == FeatureClass::Cone { 0.35 } else { 0.18 });
+        let up = part_from_feature.inverse() * Vector3::z();
         let (feature_from_carrier, tilt, azimuth) = if lying {
             lying_on(&body, &part_from_feature, size, rng)
         } else {
@@ -91,12 +79,18 @@ impl Specimen {
             let gap = if rng.random_bool(0.3) { rng.random_range(0.0..0.06) } else { 0.0 };
             let bottom = Translation3::new(0.0, 0.0, -body.half_extents()[2] - gap);
             let on = part_from_feature.inverse() * Isometry3::from_parts(bottom, askew(rng));
-            (on, rng.random_range(TILT[0]..TILT[1]), rng.random_range(0.0..TAU))
+            if up.z > 0.5 {
+                (on, rng.random_range(domain.tilt[0]..domain.tilt[1]), rng.random_range(0.0..TAU))
+            } else {
+                // It looks sideways: seen from above the carrier.
+                (on, rng.random_range(0.45..0.95), up.y.atan2(up.x) + rng.random_range(-0.6..0.6))
+            }
         };
         let roll = rng.random_range(0.0..TAU);
         let feature_from_camera = feature_from_camera(focus, tilt, azimuth, roll, aim);
-        let count = if rng.random_bool(0.35) { 0 } else { rng.random_range(1..5) };
-        let clutter: Vec<Clutter> = (0..count).map(|_| stray(size, half_width, 2.0 * top.abs(), rng)).collect();
+        let count = if rng.random_bool(domain.tidy) { 0 } else { rng.random_range(1..=domain.clutter) };
+        let height = 2.0 * part_from_feature.translation.z.abs();
+        let clutter: Vec<Clutter> = (0..count).map(|_| stray(size, half_width, height, rng)).collect();
         let surroundings = Surroundings::on_carrier(&feature_from_carrier).with_clutter(&clutter);
         Self { feature, solid, surroundings, camera, feature_from_camera, focus, half_width }
     }
@@ -113,7 +107,26 @@ impl Specimen {
     }
 }
 
-fn log_uniform([low, high]: [f64; 2], rng: &mut ChaCha8Rng) -> f64 {
+/// A part type of a class: any of them.
+pub(super) fn kind(class: FeatureClass, rng: &mut ChaCha8Rng) -> Kind {
+    let (mut feature, form) = feature(class, rng);
+    // A bare surface is looked at as closely as anything else.
+    let size = match (class, form.other) {
+        (FeatureClass::Other, Other::Bare) => log_uniform(SIZE, rng),
+        (FeatureClass::Other, Other::Block(size, _)) => size[0].max(size[1]).max(size[2]),
+        (FeatureClass::Other, Other::Dome(diameter, _)) => diameter,
+        _ => extent(&feature),
+    };
+    let aligned = rng.random_bool(0.5);
+    let room = room(&feature, size, aligned);
+    let (body, top, at) = body(&mut feature, size, room, rng);
+    // Along the body's edges, or in any direction.
+    let turn = if aligned { 0.0 } else { rng.random_range(0.0..TAU) };
+    let part_from_feature = Isometry3::from_parts(Translation3::new(at[0], at[1], top), about_z(turn));
+    Kind { feature, form, body, part_from_feature, size }
+}
+
+pub(super) fn log_uniform([low, high]: [f64; 2], rng: &mut ChaCha8Rng) -> f64 {
     rng.random_range(low.ln()..high.ln()).exp()
 }
 

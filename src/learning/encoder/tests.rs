@@ -11,6 +11,7 @@ use tandem_config::{Body, FeatureGeometry};
 use tandem_msg::{Coded, FEATURE_CLASSES, Feature, FeatureClass, Header, PointCloud, Pose, Recognition, Stamp};
 
 use super::dataset::{Example, Look, Split, example};
+use super::domain::Domain;
 use super::parameters::Parameters;
 use super::pass::{Pass, SEGMENT, SEGMENT_STRIDE, SMOOTHING};
 use super::train::{Run, TrainOptions, train};
@@ -25,7 +26,7 @@ fn shipped() -> PathBuf {
 
 fn examples(seed: u64, split: Split, count: u64) -> Vec<Example> {
     let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
-    (0..count).map(|index| example(seed, split, index, &mut sampler, &mut cloud)).collect()
+    (0..count).map(|index| example(&Domain::source(), seed, split, index, &mut sampler, &mut cloud)).collect()
 }
 
 /// The loss in candle's operations: cross-entropy of smoothed classes, and of the points.
@@ -122,7 +123,7 @@ fn threads_change_nothing() {
         (run.parameters, run.statistics)
     });
     assert!(one == two);
-    let made = super::dataset::examples(3, Split::Train, 64, 2, &mut |_| {});
+    let made = super::dataset::examples(&Domain::source(), 3, Split::Train, 64, 2, &mut |_| {});
     assert!(made.iter().zip(&training).all(|(a, b)| a.look == b.look && a.closer == b.closer));
 }
 
@@ -193,7 +194,7 @@ fn the_shipped_model_keeps_its_promise() {
     let (mut right, mut sure, mut sure_wrong, count) = (0, 0, 0, 240);
     for index in 0..count {
         // A seed no training uses.
-        let truth = example(0xf5e5, Split::Test, index, &mut sampler, &mut cloud);
+        let truth = example(&Domain::source(), 0xf5e5, Split::Test, index, &mut sampler, &mut cloud);
         let Some(answer) = perception.recognise(&cloud) else {
             continue;
         };

@@ -12,6 +12,7 @@ use rand_chacha::ChaCha8Rng;
 use super::adam::Adam;
 use super::augment::{augmented, dropout_mask};
 use super::dataset::{Example, Look, Split, examples};
+use super::domain::Domain;
 use super::parameters::Parameters;
 use super::pass::{Pass, Plan, SEGMENT_STRIDE, Spans};
 use super::report::{self, Answers};
@@ -122,13 +123,14 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&TrainProgress)) -
     std::fs::create_dir_all(&options.out).map_err(|source| TrainError::File { file: options.out.clone(), source })?;
     let counts = [options.samples, options.samples.div_ceil(10).max(64), options.samples.div_ceil(8).max(64)];
     let total = counts[0] + counts[1];
+    let source = Domain::source();
     let made = |split, before: usize, count, progress: &mut dyn FnMut(&TrainProgress)| {
         let mut report = |made| {
             if made % 100 == 0 {
                 progress(&TrainProgress::Data(before + made, total));
             }
         };
-        examples(options.seed, split, count, options.threads, &mut report)
+        examples(&source, options.seed, split, count, options.threads, &mut report)
     };
     let file = options.out.join(CHECKPOINT);
     let mut run = Run::begin(options, &file)?;
@@ -150,16 +152,11 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&TrainProgress)) -
     }
 
     progress(&TrainProgress::Test);
-    let weights: HashMap<String, Tensor> = run.weights()?.into_iter().collect();
-    let weights_file = options.out.join(WEIGHTS_FILE);
-    candle_core::safetensors::save(&weights, &weights_file)?;
-    let bytes =
-        std::fs::read(&weights_file).map_err(|source| TrainError::File { file: weights_file.clone(), source })?;
     let mut card = Card {
         format: Card::FORMAT,
         name: "encoder".into(),
         architecture: ARCHITECTURE.into(),
-        weights_blake3: blake3::hash(&bytes).to_hex().to_string(),
+        weights_blake3: run.export(&options.out)?,
         data: DataCard {
             generator: GENERATOR.into(),
             seed: options.seed,
@@ -174,10 +171,10 @@ pub fn train(options: &TrainOptions, progress: &mut dyn FnMut(&TrainProgress)) -
         metrics: Metrics::default(),
     };
     card.write(&options.out.join(CARD_FILE))?;
-    report::calibrate(&options.out, options.seed, counts[1], &mut card)?;
+    report::calibrate(&options.out, &source, options.seed, counts[1], &mut card)?;
     card.write(&options.out.join(CARD_FILE))?;
     // Measured as it will be used: read back from the files, cloud to feature.
-    card.metrics = report::measure(&options.out, options.seed, counts[2])?;
+    card.metrics = report::measure(&options.out, &source, options.seed, counts[2])?;
     card.write(&options.out.join(CARD_FILE))?;
     let _ = std::fs::remove_file(&file);
     Ok(card)
@@ -346,6 +343,17 @@ impl Run {
             }
         }
         Ok(out)
+    }
+
+    /// Writes weights and statistics into the folder of a model; answers their BLAKE3.
+    pub(crate) fn export(&self, folder: &Path) -> Result<String, TrainError> {
+        let file = folder.join(WEIGHTS_FILE);
+        let failed = |source| TrainError::File { file: file.clone(), source };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        let weights: HashMap<String, Tensor> = self.weights()?.into_iter().collect();
+        candle_core::safetensors::save(&weights, &file)?;
+        let bytes = std::fs::read(&file).map_err(failed)?;
+        Ok(blake3::hash(&bytes).to_hex().to_string())
     }
 
     /// The network as it is now, ready to be asked.

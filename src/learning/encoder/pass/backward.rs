@@ -2,37 +2,45 @@
 
 use std::ops::Range;
 
-use tandem_msg::{Coded, FEATURE_CLASSES};
+use tandem_msg::FEATURE_CLASSES;
 
-use super::{ENERGY, Pass, Plan, SEGMENT, SMOOTHING, sized, zeroed};
-use crate::learning::encoder::dataset::Look;
+use super::{Demand, ENERGY, Pass, Plan, SEGMENT, SMOOTHING, sized, zeroed};
 use crate::perception::kernel::{Add, Store, accumulate_transposed, product};
 use crate::perception::network::{CLASS_HIDDEN, EMBED, FUSED, KEY_WIDTH, LAYERS, MEMBER, SEGMENT_HIDDEN, WIDTH};
 use crate::perception::sample::{CENTRES, NEIGHBOURS};
 
 impl Pass {
-    pub(super) fn backward(&mut self, plan: &Plan, parameters: &[f32], mask: &[f32], looks: &[&Look]) {
+    /// Loss and gradient of what was seen last.
+    pub(crate) fn backward(&mut self, plan: &Plan, parameters: &[f32], mask: &[f32], demand: &Demand<'_>) {
         let p = |span: &Range<usize>| &parameters[span.clone()];
-        let (batch, panels) = (looks.len(), &mut self.panels);
+        let (batch, panels) = (demand.classes.len(), &mut self.panels);
         let rows = batch * CENTRES;
         let gradient = zeroed(&mut self.gradient, plan.parameters);
         const S: usize = SEGMENT_HIDDEN[0];
         const T: usize = SEGMENT_HIDDEN[1];
         let [da, db, dcloud, dcontext, dfused, dlayers, dkeys, dplaces] = &mut self.scratch;
 
-        // Cross-entropy of smoothed labels, over the batch.
+        // Cross-entropy of smoothed labels, over those that have one.
+        let labelled = demand.classes.iter().flatten().count().max(1) as f32;
         let mut loss = 0.0;
         let dlogits = sized(da, batch * FEATURE_CLASSES);
-        for ((logits, d), look) in
-            self.class_logits.chunks_exact(FEATURE_CLASSES).zip(dlogits.chunks_exact_mut(FEATURE_CLASSES)).zip(looks)
+        for ((logits, d), class) in self
+            .class_logits
+            .chunks_exact(FEATURE_CLASSES)
+            .zip(dlogits.chunks_exact_mut(FEATURE_CLASSES))
+            .zip(&demand.classes)
         {
+            let Some(class) = class else {
+                d.fill(0.0);
+                continue;
+            };
             let top = logits.iter().fold(f32::NEG_INFINITY, |m, v| m.max(*v));
             let sum: f32 = logits.iter().map(|l| (l - top).exp()).sum();
             for (c, (l, d)) in logits.iter().zip(d).enumerate() {
                 let share = SMOOTHING / FEATURE_CLASSES as f32;
-                let label = share + if c == look.class.code() as usize { 1.0 - SMOOTHING } else { 0.0 };
-                loss -= label * (l - top - sum.ln()) / batch as f32;
-                *d = ((l - top).exp() / sum - label) / batch as f32;
+                let label = share + if c == *class { 1.0 - SMOOTHING } else { 0.0 };
+                loss -= label * (l - top - sum.ln()) / labelled;
+                *d = ((l - top).exp() / sum - label) / labelled;
             }
         }
         accumulate_transposed(
@@ -49,6 +57,9 @@ impl Pass {
         let dhidden = sized(db, batch * CLASS_HIDDEN);
         product(dlogits, panels, &mut Store(dhidden, CLASS_HIDDEN));
         dhidden.iter_mut().zip(mask).for_each(|(d, m)| *d *= m);
+        if let Some(other) = demand.hidden {
+            dhidden.iter_mut().zip(other).for_each(|(d, o)| *d += o);
+        }
         self.class_hidden.backward(&plan.class_hidden, parameters, gradient, dhidden);
         let weight = &mut gradient[plan.class_hidden.weight.clone()];
         accumulate_transposed(&self.cloud, 2 * FUSED, dhidden, CLASS_HIDDEN, weight);
@@ -56,51 +67,59 @@ impl Pass {
         let dcloud = sized(dcloud, batch * 2 * FUSED);
         product(dhidden, panels, &mut Store(dcloud, 2 * FUSED));
 
-        // Cross-entropy of the points, over all of them.
+        if let Some(other) = demand.features {
+            dcloud.iter_mut().zip(other).for_each(|(d, o)| *d += o);
+        }
+        let dfused = zeroed(dfused, rows * FUSED);
         let count = self.marks.len();
-        let dsegment = sized(da, count);
-        let mut sum = 0.0_f32;
-        for ((d, x), mark) in dsegment.iter_mut().zip(&self.segment_logits).zip(&self.marks) {
-            sum += x.max(0.0) + (-x.abs()).exp().ln_1p() - x * mark;
-            *d = SEGMENT * (1.0 / (1.0 + (-x).exp()) - mark) / count as f32;
-        }
-        self.loss = loss + SEGMENT * sum / count as f32;
-        accumulate_transposed(&self.segment_hidden.out, T, dsegment, 1, &mut gradient[plan.segment_out.clone()]);
-        gradient[plan.segment_bias.start] += dsegment.iter().sum::<f32>();
-        let dhidden = sized(db, count * T);
-        for (row, d) in dhidden.chunks_exact_mut(T).zip(&*dsegment) {
-            row.iter_mut().zip(p(&plan.segment_out)).for_each(|(r, w)| *r = d * w);
-        }
-        self.segment_hidden.backward(&plan.segment_hidden, parameters, gradient, dhidden);
-        let weight = &mut gradient[plan.segment_hidden.weight.clone()];
-        accumulate_transposed(&self.segment_point.out, S, dhidden, T, weight);
-        panels.fill_transposed(p(&plan.segment_hidden.weight), T, S);
-        let dpoint = sized(da, count * S);
-        product(dhidden, panels, &mut Store(dpoint, S));
-        self.segment_point.backward(&plan.segment_point, parameters, gradient, dpoint);
-        let weight = &mut gradient[plan.segment_point.weight.clone()];
-        accumulate_transposed(&self.points, MEMBER, dpoint, S, weight);
-        let dcontext = zeroed(dcontext, rows * S);
-        for (d, (homes, shares)) in dpoint.chunks_exact(S).zip(&self.homes) {
-            for (&home, &share) in homes.iter().zip(shares) {
-                let to = &mut dcontext[home as usize * S..][..S];
-                to.iter_mut().zip(d).for_each(|(t, d)| *t += share * d);
+        let marked = count / batch * demand.segmented;
+        if marked > 0 {
+            // Cross-entropy of the points, over all that count.
+            let dsegment = sized(da, count);
+            let mut sum = 0.0_f32;
+            for ((d, x), mark) in dsegment[..marked].iter_mut().zip(&self.segment_logits).zip(&self.marks) {
+                sum += x.max(0.0) + (-x.abs()).exp().ln_1p() - x * mark;
+                *d = SEGMENT * (1.0 / (1.0 + (-x).exp()) - mark) / marked as f32;
             }
-        }
-        let dcloud_context = zeroed(db, batch * S);
-        for (tokens, cloud) in dcontext.chunks_exact(CENTRES * S).zip(dcloud_context.chunks_exact_mut(S)) {
-            for row in tokens.chunks_exact(S) {
-                cloud.iter_mut().zip(row).for_each(|(c, r)| *c += r);
+            dsegment[marked..].fill(0.0);
+            loss += SEGMENT * sum / marked as f32;
+            accumulate_transposed(&self.segment_hidden.out, T, dsegment, 1, &mut gradient[plan.segment_out.clone()]);
+            gradient[plan.segment_bias.start] += dsegment.iter().sum::<f32>();
+            let dhidden = sized(db, count * T);
+            for (row, d) in dhidden.chunks_exact_mut(T).zip(&*dsegment) {
+                row.iter_mut().zip(p(&plan.segment_out)).for_each(|(r, w)| *r = d * w);
             }
+            self.segment_hidden.backward(&plan.segment_hidden, parameters, gradient, dhidden);
+            let weight = &mut gradient[plan.segment_hidden.weight.clone()];
+            accumulate_transposed(&self.segment_point.out, S, dhidden, T, weight);
+            panels.fill_transposed(p(&plan.segment_hidden.weight), T, S);
+            let dpoint = sized(da, count * S);
+            product(dhidden, panels, &mut Store(dpoint, S));
+            self.segment_point.backward(&plan.segment_point, parameters, gradient, dpoint);
+            let weight = &mut gradient[plan.segment_point.weight.clone()];
+            accumulate_transposed(&self.points, MEMBER, dpoint, S, weight);
+            let dcontext = zeroed(dcontext, rows * S);
+            for (d, (homes, shares)) in dpoint.chunks_exact(S).zip(&self.homes) {
+                for (&home, &share) in homes.iter().zip(shares) {
+                    let to = &mut dcontext[home as usize * S..][..S];
+                    to.iter_mut().zip(d).for_each(|(t, d)| *t += share * d);
+                }
+            }
+            let dcloud_context = zeroed(db, batch * S);
+            for (tokens, cloud) in dcontext.chunks_exact(CENTRES * S).zip(dcloud_context.chunks_exact_mut(S)) {
+                for row in tokens.chunks_exact(S) {
+                    cloud.iter_mut().zip(row).for_each(|(c, r)| *c += r);
+                }
+            }
+            let weight = &mut gradient[plan.segment_cloud.clone()];
+            accumulate_transposed(&self.cloud, 2 * FUSED, dcloud_context, S, weight);
+            panels.fill_transposed(p(&plan.segment_cloud), S, 2 * FUSED);
+            product(dcloud_context, panels, &mut Add(dcloud, 2 * FUSED));
+            accumulate_transposed(&self.fuse.out, FUSED, dcontext, S, &mut gradient[plan.segment_token.clone()]);
+            panels.fill_transposed(p(&plan.segment_token), S, FUSED);
+            product(dcontext, panels, &mut Store(dfused, FUSED));
         }
-        let weight = &mut gradient[plan.segment_cloud.clone()];
-        accumulate_transposed(&self.cloud, 2 * FUSED, dcloud_context, S, weight);
-        panels.fill_transposed(p(&plan.segment_cloud), S, 2 * FUSED);
-        product(dcloud_context, panels, &mut Add(dcloud, 2 * FUSED));
-        accumulate_transposed(&self.fuse.out, FUSED, dcontext, S, &mut gradient[plan.segment_token.clone()]);
-        panels.fill_transposed(p(&plan.segment_token), S, FUSED);
-        let dfused = sized(dfused, rows * FUSED);
-        product(dcontext, panels, &mut Store(dfused, FUSED));
+        self.loss = loss;
 
         // Pooling over the tokens.
         for (b, (tokens, cloud)) in

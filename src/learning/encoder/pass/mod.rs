@@ -16,6 +16,8 @@ mod norm;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
+use tandem_msg::Coded;
+
 use super::dataset::Look;
 use crate::perception::kernel::Panels;
 use crate::perception::network::{CLASS_HIDDEN, EMBED, FUSED, KEY_WIDTH, LAYERS, SEGMENT_HIDDEN, WIDTH, member};
@@ -191,14 +193,46 @@ fn sized(buffer: &mut Vec<f32>, len: usize) -> &mut [f32] {
     buffer
 }
 
+/// What is asked of a shard: where its losses and their gradients come from.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Demand<'a> {
+    /// Class each look should be answered with; `None` is as well as any.
+    pub(crate) classes: Vec<Option<usize>>,
+    /// So many looks, the first ones, should be segmented as they are marked.
+    pub(crate) segmented: usize,
+    /// Gradient of another loss by the features of the clouds, looks × [`FEATURES`].
+    pub(crate) features: Option<&'a [f32]>,
+    /// Gradient of another loss by the hidden layer of the classification head, looks × [`CLASS_HIDDEN`].
+    pub(crate) hidden: Option<&'a [f32]>,
+}
+
+/// Features of a cloud: largest and mean of each channel over its tokens.
+pub(crate) const FEATURES: usize = 2 * FUSED;
+
 impl Pass {
-    /// Loss of a shard, its gradient, statistics and logits. `mask` multiplies the hidden layer of the
-    /// classification head.
+    /// Loss of a shard of labelled looks, its gradient, statistics and logits. `mask` multiplies the
+    /// hidden layer of the classification head.
     pub(crate) fn run(&mut self, plan: &Plan, parameters: &[f32], looks: &[&Look], mask: &[f32], phase: usize) {
+        let classes = looks.iter().map(|look| Some(look.class.code() as usize)).collect();
+        self.see(plan, parameters, looks, mask, phase);
+        self.backward(plan, parameters, mask, &Demand { classes, segmented: looks.len(), ..Demand::default() });
+    }
+
+    /// Features, statistics and logits of a shard.
+    pub(crate) fn see(&mut self, plan: &Plan, parameters: &[f32], looks: &[&Look], mask: &[f32], phase: usize) {
         self.statistics.resize(plan.statistics, 0.0);
         self.read(looks, phase);
         self.forward(plan, parameters, mask, looks.len());
-        self.backward(plan, parameters, mask, looks);
+    }
+
+    /// Features of the clouds seen last, looks × [`FEATURES`].
+    pub(crate) fn features(&self) -> &[f32] {
+        &self.cloud
+    }
+
+    /// Hidden layer of the classification head, looks × [`CLASS_HIDDEN`].
+    pub(crate) fn hidden(&self) -> &[f32] {
+        &self.class_hidden.out
     }
 
     fn read(&mut self, looks: &[&Look], phase: usize) {
