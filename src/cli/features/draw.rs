@@ -51,6 +51,7 @@ fn curves(outcomes: &[Outcome]) -> Figure {
 fn page(findings: &Findings) -> String {
     let mut out = String::from(
         "# Features: recognised, measured, carried to another product\n\n\
+         ```\ntandem eval features --report docs/features\n```\n\n\
          Source: any part, the plant's camera. Target: the eleven part types of the S472 G box in other sizes, under another\n\
          scanner. Test parts are none of those anything was fitted on or chosen by.\n\n\
          | | source | target |\n|---|---|---|\n",
@@ -67,7 +68,8 @@ fn page(findings: &Findings) -> String {
         out,
         "\n## Ways of transfer\n\nAccuracy on {TEST} test parts of the target, from cloud to feature, mean ± standard deviation over the seeds.\n\
          Every method starts from the same source encoder, sees the same {UNLABELLED} unlabelled parts and, in the second column,\n\
-         the same {LABELS} labelled ones a class, and may spend the same {BUDGET} looks (a look forward counts one, forward and back three).\n\n\
+         the same {LABELS} labelled ones a class, and may spend the same {BUDGET} looks (a look forward counts one, forward and back three);\n\
+         random and greedy choose among the moves of dqn.\n\n\
          | method | no labels | {LABELS} labels a class | seeds |\n|---|---|---|---|"
     );
     for method in Method::ALL {
