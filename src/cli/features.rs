@@ -47,6 +47,9 @@ pub(super) struct FeaturesArgs {
 
 /// Everything a report tells.
 struct Findings {
+    quick: bool,
+    /// Test examples of source and target.
+    counts: [usize; 2],
     source: Metrics,
     /// Of the model that ships.
     target: Metrics,
@@ -118,7 +121,7 @@ fn find(args: &FeaturesArgs) -> Result<Findings, String> {
     if target_card.architecture != source_card.architecture {
         return Err(format!("{} is for another network than {}", args.target.display(), between.source.display()));
     }
-    Ok(Findings { source, target, rows: compare::rows(&outcomes), outcomes })
+    Ok(Findings { quick: args.quick, counts, source, target, rows: compare::rows(&outcomes), outcomes })
 }
 
 fn rows(m: &Metrics) -> Vec<(&'static str, f64, &'static str)> {

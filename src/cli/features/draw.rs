@@ -49,12 +49,13 @@ fn curves(outcomes: &[Outcome]) -> Figure {
 }
 
 fn page(findings: &Findings) -> String {
-    let mut out = String::from(
+    let (quick, [source, target]) = (if findings.quick { " --quick" } else { "" }, findings.counts);
+    let mut out = format!(
         "# Features: recognised, measured, carried to another product\n\n\
-         ```\ntandem eval features --report docs/features\n```\n\n\
+         ```\ntandem eval features{quick} --report docs/features\n```\n\n\
          Source: any part, the plant's camera. Target: the eleven part types of the S472 G box in other sizes, under another\n\
-         scanner. Test parts are none of those anything was fitted on or chosen by.\n\n\
-         | | source | target |\n|---|---|---|\n",
+         scanner, by the model that ships for it. Test parts are none of those anything was fitted on or chosen by.\n\n\
+         | | source, {source} parts | target, {target} parts |\n|---|---|---|\n",
     );
     // Writing to a string cannot fail.
     for ((case, source, unit), (_, target, _)) in rows(&findings.source).into_iter().zip(rows(&findings.target)) {

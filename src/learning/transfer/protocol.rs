@@ -3,8 +3,9 @@
 //! All methods start from the same source encoder and see the same looks of the same parts: the
 //! source's, an unlabelled set of the target's and, where labels are allowed, the same few labelled
 //! ones. All may spend the same: a look forward counts one, forward and backward three. Each
-//! has been tuned with the same number of trials on the validation split of the target under seed
-//! [`TUNING_SEED`], which no reported run uses; what was found is in [`Settings::of`]. Nothing is chosen
+//! has been tuned with four trials on the validation split of the target under seed [`TUNING_SEED`],
+//! which no reported run uses, the moves of the agents by the random player; what was found is
+//! in [`Settings::of`]. Nothing is chosen
 //! by the test split, which is read once a run, at its end.
 
 use std::fmt;
