@@ -58,16 +58,18 @@ fn every_random_problem_is_solved_validly() {
                 for (worst, fault) in worst.iter_mut().zip(relative) {
                     *worst = worst.max(if fault.is_nan() { f64::INFINITY } else { fault });
                 }
-                let near = match kind {
-                    Kind::Noise => 1e-10,
-                    Kind::Scales => 1e-13,
-                    _ => 1e-14,
+                // An acceleration far outside its limits leaves its own roundings to a cruise of hours.
+                let (near, fast) = match kind {
+                    Kind::Noise => (1e-10, 1e-11),
+                    Kind::Scales => (1e-13, 1e-14),
+                    Kind::Outside => (1e-13, 1e-13),
+                    _ => (1e-14, 1e-14),
                 };
                 // A cruise of hours turns roundings of the acceleration before it into a velocity.
                 let excess = 1e-11 + (2.0 * blur + 4e-15 * push) * duration;
                 assert!(
                     relative[0] < near
-                        && relative[1] < if kind == Kind::Noise { 1e-11 } else { 1e-14 }
+                        && relative[1] < fast
                         && relative[2] < 1e-13
                         && relative[3] < excess
                         && relative[4] < 1e-13,
