@@ -1,7 +1,8 @@
 //! The search for the nearest pair: boxes rule out most, capsules nearly all others, and of the pairs that are
 //! left the one that could be nearest is looked at first.
 //!
-//! What rules a pair out is a bound that its answer never undercuts, so the answer does not depend on the order.
+//! What rules a pair out is a bound on its distance, so the order changes no answer, but where a depth was left open:
+//! that of a pair that is ruled out is not as deep as the answer.
 
 use crate::kernel::{Near, Wanted};
 use crate::obstacle::Obstacle;
