@@ -6,6 +6,7 @@ use crate::human::Human;
 use crate::layout::Layout;
 use crate::perception::Perception;
 use crate::plant::Plant;
+use crate::policies;
 use crate::product::{self, Product};
 use crate::read::{Bound, Reading, Table, bound};
 use crate::robot::{Collision, Robot, RobotOptions};
@@ -14,6 +15,7 @@ use crate::supervisor::Supervisor;
 use crate::timing::{Realtime, Timing};
 use std::path::{Component, Path, PathBuf};
 use tandem_controller::Params;
+use tandem_policy::Policies;
 
 const HOME: Bound = bound("home_rad", "rad", -6.3, 6.3);
 const ACCELERATION: Bound = bound("acceleration_max_rad_s2", "rad/s2", 0.1, 100.0);
@@ -57,6 +59,8 @@ pub struct Cell {
     pub supervisor: Supervisor,
     /// Where the library and the journal are kept.
     pub store: Store,
+    /// Precomputed policies of the product, as far as there are any.
+    pub policies: Policies,
     /// What is assembled.
     pub product: Product,
     /// Feature and parameters to mode and tool.
@@ -108,6 +112,10 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
     let store = read_store(&root);
     let robot = read_robot(&root, folder, reading);
     let product = layout.as_ref().and_then(|layout| read_product(&root, product, folder, layout, reading));
+    let policies = root
+        .text_if("policies")
+        .zip(product.as_ref())
+        .map(|(models, product)| policies::read(&beside(folder, &models).join(&product.name), reading));
     let (reference, strategies) = read_strategies(&root, folder, reading);
     if reference.is_empty() || strategies.is_empty() {
         let found = format!("{} reference rows, {} strategies", reference.len(), strategies.len());
@@ -133,6 +141,7 @@ fn read(path: &Path, product: Option<&str>, reading: &Reading) -> Option<Cell> {
         perception: perception?,
         supervisor: supervisor?,
         store,
+        policies: policies.unwrap_or_default(),
         product,
         reference,
         strategies,

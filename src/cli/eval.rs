@@ -2,7 +2,7 @@
 
 use clap::{Args, Subcommand};
 
-use super::{features, safety};
+use super::{features, policies, safety};
 
 #[derive(Args)]
 pub(super) struct EvalArgs {
@@ -16,11 +16,14 @@ enum What {
     Features(features::FeaturesArgs),
     /// Random scenes, motions and people against the controller: is anybody touched, is anybody in the way for nothing
     Safety(safety::SafetyArgs),
+    /// Collision rate and running time of learned, hand-made and planned motion, subtask by subtask
+    Policies(policies::PoliciesArgs),
 }
 
 pub(super) fn eval(args: &EvalArgs) -> u8 {
     match &args.what {
         What::Features(args) => features::features(args),
         What::Safety(args) => safety::safety(args),
+        What::Policies(args) => policies::policies(args),
     }
 }

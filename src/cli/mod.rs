@@ -11,6 +11,7 @@ mod eval;
 pub mod exit;
 mod features;
 mod journal;
+mod policies;
 mod progress;
 mod recognise;
 mod role;

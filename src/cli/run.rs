@@ -17,7 +17,7 @@ use crate::live::{self, signals};
 use crate::lockstep::SimCell;
 use crate::strategy::Library;
 use crate::strategy::store::{RunRecord, Store, StoreError, default_url};
-use crate::supervisor::{Event, Outcome, RunOptions, Summary};
+use crate::supervisor::{Event, Outcome, Planned, RunOptions, Summary};
 
 #[derive(Args)]
 pub(super) struct RunArgs {
@@ -242,6 +242,12 @@ fn loop_table(loops: &[Snapshot]) -> Table {
     table
 }
 
+/// Who planned the ways across.
+fn planned(planned: &Planned) -> String {
+    let share = planned.policy_share().map_or(String::new(), |share| format!("{:.0} % by policy: ", 1e2 * share));
+    format!("{share}policy {}, manual {}, sampled {}", planned.policy, planned.manual, planned.rrt_connect)
+}
+
 fn table(summary: &Summary, restarts: u32, wall_time_s: f64) -> Table {
     let clearance = summary.min_clearance_m.map_or("the arm did not move".to_owned(), |m| format!("{:.0} mm", m * 1e3));
     let rows = [
@@ -249,6 +255,7 @@ fn table(summary: &Summary, restarts: u32, wall_time_s: f64) -> Table {
         ("steps done", summary.steps_done.to_string()),
         ("attempts failed", summary.steps_failed.to_string()),
         ("fallback plans", summary.fallbacks.to_string()),
+        ("ways across", planned(&summary.planned)),
         ("protective stops", summary.stops.to_string()),
         ("contacts", summary.contacts.to_string()),
         ("restarted processes", restarts.to_string()),

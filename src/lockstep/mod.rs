@@ -237,7 +237,8 @@ impl SimCell {
 /// # Errors
 /// Parameters it refuses.
 pub fn build_controller(cell: &Cell) -> Result<Controller, ParamsError> {
-    Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller)
+    let controller = Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller)?;
+    Ok(controller.with_policies(cell.policies.clone()))
 }
 
 fn identity(role: Role, epoch: u64, config_hash: u64) -> Identity {

@@ -1,6 +1,7 @@
 //! What a run tells about itself: one event a line in `--json`, and the final summary.
 
 use serde::Serialize;
+use tandem_msg::Planner;
 
 /// Something that happened, with the seconds since the run began on the cell's clock.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -341,6 +342,8 @@ pub struct Summary {
     pub steps_failed: u32,
     /// Motions that had to be planned by the next planner.
     pub fallbacks: u32,
+    /// Finished motions, by who planned the way across.
+    pub planned: Planned,
     /// Protective stops.
     pub stops: u32,
     /// Referee: contacts with what must not be touched.
@@ -351,6 +354,38 @@ pub struct Summary {
     pub sim_time_s: f64,
     /// Seed.
     pub seed: u64,
+}
+
+/// Motions by their planner.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Planned {
+    /// By a learned policy.
+    pub policy: u32,
+    /// By a hand-designed route.
+    pub manual: u32,
+    /// By the sampling planner.
+    pub rrt_connect: u32,
+    /// By nobody: straight on, or straight back.
+    pub straight: u32,
+}
+
+impl Planned {
+    /// Counts one.
+    pub(super) fn count(&mut self, planner: Planner) {
+        match planner {
+            Planner::Policy => self.policy += 1,
+            Planner::Manual => self.manual += 1,
+            Planner::RrtConnect => self.rrt_connect += 1,
+            Planner::Straight => self.straight += 1,
+            Planner::None => {}
+        }
+    }
+
+    /// Of the motions that had a way across, the share that a policy found; `None` when there were none.
+    pub fn policy_share(&self) -> Option<f64> {
+        let across = self.policy + self.manual + self.rrt_connect;
+        (across > 0).then(|| f64::from(self.policy) / f64::from(across))
+    }
 }
 
 /// Seconds or metres with the digits a reader can use.

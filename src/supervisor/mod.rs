@@ -32,7 +32,7 @@ mod tests;
 mod watch;
 
 pub use capability::{Demand, Margins, Reason, Verdict, judge};
-pub use event::{Event, EventKind, Outcome, Summary};
+pub use event::{Event, EventKind, Outcome, Planned, Summary};
 pub use role::Supervisor;
 
 use crate::strategy::JournalEntry;

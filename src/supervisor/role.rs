@@ -5,7 +5,7 @@ mod deciding;
 mod seeing;
 mod watching;
 
-use super::event::{Event, EventKind, Outcome, Summary, rounded};
+use super::event::{Event, EventKind, Outcome, Planned, Summary, rounded};
 use super::look::Doubt;
 use super::placing::Surveyed;
 use super::step::{Line, Work};
@@ -97,6 +97,7 @@ impl Supervisor {
             steps_done: 0,
             steps_failed: 0,
             fallbacks: 0,
+            planned: Planned::default(),
             stops: 0,
             contacts: 0,
             min_clearance_m: None,

@@ -44,9 +44,15 @@ impl Current {
         if motion.clearance_min.is_finite() {
             self.clearance_min = self.clearance_min.min(motion.clearance_min);
         }
-        if self.planner != Planner::RrtConnect
-            && let Some(planner) = motion.planner.get().filter(|planner| *planner != Planner::None)
-        {
+        // A motion that is planned anew counts for the last planner that was needed.
+        let rank = |planner: Planner| match planner {
+            Planner::None => 0,
+            Planner::Straight => 1,
+            Planner::Policy => 2,
+            Planner::Manual => 3,
+            Planner::RrtConnect => 4,
+        };
+        if let Some(planner) = motion.planner.get().filter(|planner| rank(*planner) > rank(self.planner)) {
             self.planner = planner;
         }
     }

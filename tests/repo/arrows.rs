@@ -11,12 +11,31 @@ const ALLOWED: &[(&str, &[&str])] = &[
     ("realtime/cycle", &["tandem-msg"]),
     ("realtime/clearance", &["tandem-msg", "tandem-kinematics"]),
     ("realtime/planner", &["tandem-kinematics", "tandem-clearance"]),
-    ("realtime/policy", &[]),
+    ("realtime/policy", &["tandem-msg", "tandem-kinematics", "tandem-clearance"]),
     (
         "realtime/controller",
-        &["tandem-msg", "tandem-trajectory", "tandem-kinematics", "tandem-clearance", "tandem-planner"],
+        &[
+            "tandem-msg",
+            "tandem-trajectory",
+            "tandem-kinematics",
+            "tandem-clearance",
+            "tandem-planner",
+            "tandem-policy",
+        ],
     ),
-    ("config", &["tandem-msg", "tandem-kinematics", "tandem-clearance", "tandem-controller"]),
+    ("config", &["tandem-msg", "tandem-kinematics", "tandem-clearance", "tandem-policy", "tandem-controller"]),
+    (
+        "src/learning/motion",
+        &[
+            "tandem-msg",
+            "tandem-kinematics",
+            "tandem-clearance",
+            "tandem-planner",
+            "tandem-policy",
+            "tandem-trajectory",
+            "tandem-config",
+        ],
+    ),
     ("benches/peers", &[]),
 ];
 

@@ -121,6 +121,7 @@ impl Job {
             attached: *self.attached(),
             touch: self.touch(),
             touch_at_start: self.touch_at_start(),
+            subtask: self.task.subtask.get().unwrap_or(Subtask::None),
             seed: config_hash ^ (u64::from(self.task.id) << 32),
         }
     }

@@ -48,6 +48,7 @@ mod sweep;
 mod workspace;
 
 pub use params::{OutOfRange, Params, ParamsError, SeparationParams};
+pub use plan::policy_for;
 pub use role::{Controller, ControllerInputs, ControllerOutputs};
 pub use workspace::{WALLS_MAX, Wall, Workspace};
 

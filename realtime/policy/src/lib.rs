@@ -25,12 +25,18 @@
 //! **Invariant:** nothing here allocates, blocks, reads a clock or panics.
 
 mod dense;
+mod observe;
 mod policy;
+mod rollout;
 mod shape;
+mod stored;
 mod tanh;
 
+pub use observe::{DOF, Destination, FAR, OBSERVATION, OBSTACLES, Observation, SCALE, Surroundings, observe};
 pub use policy::{Activations, NotFinite, Policy};
+pub use rollout::{CAPTURE, REFUSED_MAX, Rollout, STEP, STEPS_MAX};
 pub use shape::{Lateral, Shape, ShapeError};
+pub use stored::{Policies, Stored};
 
 /// Units of a hidden layer ("256, FC, relu" in Fig. 7).
 pub const HIDDEN: usize = 256;

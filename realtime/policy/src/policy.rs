@@ -58,11 +58,16 @@ impl<'w> Policy<'w> {
     /// [`ShapeError`].
     pub fn new(shape: Shape, numbers: &'w [f32]) -> Result<Self, ShapeError> {
         shape.check(numbers)?;
+        Ok(Self::checked(shape, numbers))
+    }
+
+    /// The policy of numbers that were checked before.
+    pub(crate) fn checked(shape: Shape, numbers: &'w [f32]) -> Self {
         #[cfg(target_arch = "x86_64")]
         let wide = std::arch::is_x86_feature_detected!("avx2");
         #[cfg(not(target_arch = "x86_64"))]
         let wide = false;
-        Ok(Self { shape, numbers, wide })
+        Self { shape, numbers, wide }
     }
 
     /// Its shape.

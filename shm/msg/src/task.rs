@@ -152,6 +152,10 @@ coded! {
         Manual = 1, "manual";
         /// Rapidly-exploring random trees from both ends, when no hand-designed path is clear.
         RrtConnect = 2, "rrt_connect";
+        /// A learned policy, rolled out ahead of time and found clear.
+        Policy = 3, "policy";
+        /// Nobody had to: straight on, or straight back.
+        Straight = 4, "straight";
     }
 }
 

@@ -26,16 +26,31 @@ impl Supervisor {
                 self.follow_prompt(until, &current, inputs, out)
             }
         };
-        if current.planner != planner && current.planner == Planner::RrtConnect {
+        if current.planner != planner
+            && let Some(from) = self.fell_back_from(&current)
+        {
             self.summary.fallbacks += 1;
             let (_, subtask) = current.operation.names();
             let (part, planner) = (self.part().name.clone(), current.planner.name());
-            self.say(out, EventKind::Fallback { subtask, part, from: Planner::Manual.name(), planner });
+            self.say(out, EventKind::Fallback { subtask, part, from: from.name(), planner });
         }
         match result {
             Progress::Going => self.work.current = Some(current),
             Progress::Done => self.operation_done(&current, out),
             Progress::Failed { reason, again } => self.failed(reason, again, inputs, out),
+        }
+    }
+
+    /// The planner that should have found the way of a motion, where the next one had to.
+    fn fell_back_from(&self, current: &Current) -> Option<Planner> {
+        let Operation::Motion(task) = &current.operation else { return None };
+        match current.planner {
+            Planner::RrtConnect => Some(Planner::Manual),
+            Planner::Manual => {
+                let subtask = task.subtask.get().unwrap_or(Subtask::None);
+                tandem_controller::policy_for(&self.cell.policies, subtask).map(|_| Planner::Policy)
+            }
+            Planner::None | Planner::Policy | Planner::Straight => None,
         }
     }
 
@@ -176,6 +191,7 @@ impl Supervisor {
             self.summary.min_clearance_m = Some(least);
         }
         let moved = matches!(current.operation, Operation::Motion(_));
+        self.summary.planned.count(current.planner);
         self.say(
             out,
             EventKind::ActionDone {

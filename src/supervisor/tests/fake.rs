@@ -243,7 +243,7 @@ impl Fake {
             self.motion.task_id = task.id;
             self.motion.phase = Code::of(if task.id == 0 { MotionPhase::Idle } else { MotionPhase::Transfer });
             let sampled = self.script.sampled.is_some_and(|subtask| task.subtask.is(subtask));
-            self.motion.planner = Code::of(if sampled { Planner::RrtConnect } else { Planner::Manual });
+            self.motion.planner = Code::of(if sampled { Planner::RrtConnect } else { Planner::Policy });
             self.motion.clearance_min = 0.02;
             self.motion_since = self.now;
             let objects = self.outputs.scene.objects().iter().map(|object| object.id).collect();

@@ -1,5 +1,5 @@
-//! The manual planner: the paper's hand-designed path (Section 3.2.2), its baseline; behind it a
-//! sampling planner for the transfer.
+//! Planning: what was learned first, then the paper's hand-designed path (Section 3.2.2), its baseline;
+//! behind them a sampling planner for the transfer.
 //!
 //! ```text
 //! depart ----> transfer (direct, or over hand-made via points) ----> approach
@@ -13,6 +13,9 @@
 //! configuration). It takes a bounded number of steps a cycle while the arm
 //! stands; a step is one inverse-kinematics solution or one clearance sample.
 //!
+//! **Policy.** Where the task's subtask has a policy, it is rolled out ahead of time before the first of these
+//! routes is tried ([`preview`]); what it does not bring across clear is left to them.
+//!
 //! **Fallback.** When no candidate is clear, the sampling planner ([`tandem_planner`]) looks for a transfer
 //! from any clear departure to any clear approach, and the plan is said to be its own ([`Search::planner`]).
 //!
@@ -21,14 +24,16 @@
 //! nearer than it is; the objects of the task and of the one before may be
 //! touched until that stretch is done.
 
+mod preview;
 mod route;
 mod sampled;
 
 use nalgebra::{Isometry3, Translation3};
 use tandem_clearance::Monitor;
 use tandem_kinematics::{Branches, Chain};
-use tandem_msg::{AttachedPart, MotionFailure, MotionPhase, Planner};
+use tandem_msg::{AttachedPart, MotionFailure, MotionPhase, Planner, Subtask};
 use tandem_planner::Progress as Sampling;
+use tandem_policy::{Policies, Surroundings};
 
 use crate::law::{Law, LawLimits};
 use crate::line::Line;
@@ -36,6 +41,8 @@ use crate::path::Path;
 use crate::reach::Reach;
 use crate::sweep::{Sweep, Swept};
 use crate::{Joints, Params};
+use preview::Preview;
+pub use preview::policy_for;
 use route::{ROUTES, via_points};
 use sampled::{Joined, Sampled};
 use tandem_trajectory::State;
@@ -88,6 +95,8 @@ pub(crate) struct Goal {
     pub(crate) touch: Touch,
     /// May be touched on the first stretch.
     pub(crate) touch_at_start: Touch,
+    /// What the motion is for: which policy is asked.
+    pub(crate) subtask: Subtask,
     /// Where a sampled way takes its randomness from.
     pub(crate) seed: u64,
 }
@@ -103,6 +112,9 @@ enum Step {
     Depart,
     DepartLine,
     DepartSweep,
+    Preview,
+    PreviewPath,
+    PreviewSweep,
     Route,
     RouteSweep,
     Sample,
@@ -142,6 +154,10 @@ pub(crate) struct Search {
     /// Legs of the present candidate that are checked already.
     checked: usize,
     floor: f64,
+    preview: Preview,
+    previews: u32,
+    /// Who made the plan.
+    planner: Planner,
     sampled: Sampled,
     /// What the sampled transfer joins, once there is one.
     joined: Option<Joined>,
@@ -153,6 +169,8 @@ pub(crate) struct Tools<'a> {
     pub(crate) params: &'a Params,
     pub(crate) reach: &'a Reach,
     pub(crate) monitor: &'a mut Monitor,
+    pub(crate) policies: &'a Policies,
+    pub(crate) surroundings: &'a Surroundings,
 }
 
 impl Search {
@@ -176,6 +194,7 @@ impl Search {
                 attached: AttachedPart::default(),
                 touch: [0; 16],
                 touch_at_start: [0; 16],
+                subtask: Subtask::None,
                 seed: 0,
             },
             start: nowhere,
@@ -196,6 +215,9 @@ impl Search {
             count: 0,
             checked: 0,
             floor: 0.0,
+            preview: Preview::new(),
+            previews: 0,
+            planner: Planner::None,
             sampled: Sampled::new(),
             joined: None,
         }
@@ -209,11 +231,13 @@ impl Search {
         self.count = 0;
         self.sampled.clear();
         self.joined = None;
+        self.previews = 0;
+        self.planner = Planner::Manual;
     }
 
     /// Who made the plan.
     pub(crate) fn planner(&self) -> Planner {
-        if self.joined.is_some() { Planner::RrtConnect } else { Planner::Manual }
+        self.planner
     }
 
     /// The stretches found.
@@ -243,6 +267,7 @@ impl Search {
                         Step::StraightLine | Step::ApproachLine | Step::DepartLine => 4,
                         Step::StraightSweep | Step::ApproachSweep | Step::DepartSweep | Step::RouteSweep => 4,
                         Step::Sample => 4,
+                        Step::Preview => 12,
                         _ => 2,
                     };
                     budget = budget.saturating_sub(cost);
@@ -270,7 +295,10 @@ impl Search {
             },
             Step::StraightSweep => match self.sweep.step(tools.chain, tools.monitor, &self.legs[0].path) {
                 Swept::More => step,
-                Swept::Clear => Step::Found,
+                Swept::Clear => {
+                    self.planner = Planner::Straight;
+                    Step::Found
+                }
                 Swept::Blocked => self.after_straight(tools),
             },
             Step::Branch => self.next_branch(tools),
@@ -313,8 +341,18 @@ impl Search {
             },
             Step::DepartSweep => match self.sweep.step(tools.chain, tools.monitor, &self.legs[0].path) {
                 Swept::More => step,
-                Swept::Clear => self.departed(),
+                Swept::Clear => self.departed(tools),
                 Swept::Blocked => Step::Depart,
+            },
+            Step::Preview => self.preview(tools),
+            Step::PreviewPath => self.preview_path(tools),
+            Step::PreviewSweep => match self.sweep.step(tools.chain, tools.monitor, &self.legs[self.checked].path) {
+                Swept::More => step,
+                Swept::Clear => {
+                    self.planner = Planner::Policy;
+                    self.finish()
+                }
+                Swept::Blocked => Step::PreviewPath,
             },
             Step::Route => self.next_route(tools),
             Step::RouteSweep => match self.sweep.step(tools.chain, tools.monitor, &self.legs[self.checked].path) {
@@ -421,10 +459,13 @@ impl Search {
     }
 
     /// The way to depart in hand is clear.
-    fn departed(&mut self) -> Step {
+    fn departed(&mut self, tools: &mut Tools<'_>) -> Step {
         self.sampled.note_start(self.depart - 1, &self.depart_end);
         self.route = 0;
-        if self.joined.is_some() { Step::Join } else { Step::Route }
+        if self.joined.is_some() {
+            return Step::Join;
+        }
+        self.begin_preview(tools).unwrap_or(Step::Route)
     }
 
     fn next_depart(&mut self, tools: &mut Tools<'_>) -> Step {
@@ -438,7 +479,7 @@ impl Search {
         let to = match way {
             0 => {
                 self.depart_end = self.start;
-                return self.departed();
+                return self.departed(tools);
             }
             1 => from * Translation3::new(0.0, 0.0, -tools.params.depart_distance),
             _ if way < DEPARTS => {
@@ -483,48 +524,6 @@ impl Search {
         self.checked = first;
         self.sweep_leg(tools, first);
         Step::RouteSweep
-    }
-
-    /// No candidate is clear: the transfer is left to the sampling planner, where there is one to search.
-    fn fall_back(&mut self, tools: &mut Tools<'_>) -> Step {
-        if !self.reached {
-            return Step::Failed(MotionFailure::Unreachable);
-        }
-        if !self.sampled.is_promising() || tools.params.sampling_looks_max == 0 {
-            return Step::Failed(MotionFailure::NoClearPath);
-        }
-        tools.monitor.set_touch(&[0; 16]);
-        self.sampled.begin(tools.chain, tools.monitor, tools.params, self.goal.seed);
-        Step::Sample
-    }
-
-    /// A transfer was found: its departure and approach are made once more.
-    fn begin_joining(&mut self) -> Step {
-        self.joined = self.sampled.joined();
-        self.approach = None;
-        match self.joined {
-            Some(joined) => {
-                self.branch = joined.branch + 1;
-                self.begin_branch()
-            }
-            None => Step::Failed(MotionFailure::NoClearPath),
-        }
-    }
-
-    /// Puts departure, sampled transfer and approach together.
-    fn join(&mut self, tools: &Tools<'_>) -> Step {
-        let first = usize::from(self.depart > 1);
-        let across = self.sampled.path().len().saturating_sub(1);
-        if first + across + usize::from(self.approach.is_some()) > LEGS_MAX {
-            return Step::Failed(MotionFailure::NoClearPath);
-        }
-        for index in 0..across {
-            let [from, to] = [index, index + 1].map(|k| self.sampled.path()[k]);
-            let path = Path::line(&from, &to);
-            self.legs[first + index] = self.leg(tools, &path, MotionPhase::Transfer, [0; 16], tools.params.path_margin);
-        }
-        self.count = first + across;
-        self.finish()
     }
 
     /// All up to the approach is there.

@@ -6,9 +6,11 @@
 
 use tandem_clearance::Monitor;
 use tandem_kinematics::Chain;
+use tandem_msg::{MotionFailure, MotionPhase, Planner as PlannedBy};
 use tandem_planner::{Planner, Progress, Request};
 
-use super::DEPARTS;
+use super::{DEPARTS, LEGS_MAX, Search, Step, Tools};
+use crate::path::Path;
 use crate::{Joints, Params};
 
 /// Joint positions in each tree of the planner, after which they are grown anew: about 1.5 MB in all.
@@ -103,5 +105,50 @@ impl Sampled {
         let start = self.starts[..self.start_count].iter().position(|start| start == first)?;
         let goal = self.goals[..self.goal_count].iter().position(|goal| goal == last)?;
         Some(Joined { way: self.ways[start], branch: self.branches[goal] })
+    }
+}
+
+impl Search {
+    /// No candidate is clear: the transfer is left to the sampling planner, where there is one to search.
+    pub(super) fn fall_back(&mut self, tools: &mut Tools<'_>) -> Step {
+        if !self.reached {
+            return Step::Failed(MotionFailure::Unreachable);
+        }
+        if !self.sampled.is_promising() || tools.params.sampling_looks_max == 0 {
+            return Step::Failed(MotionFailure::NoClearPath);
+        }
+        tools.monitor.set_touch(&[0; 16]);
+        self.sampled.begin(tools.chain, tools.monitor, tools.params, self.goal.seed);
+        Step::Sample
+    }
+
+    /// A transfer was found: its departure and approach are made once more.
+    pub(super) fn begin_joining(&mut self) -> Step {
+        self.joined = self.sampled.joined();
+        self.approach = None;
+        match self.joined {
+            Some(joined) => {
+                self.planner = PlannedBy::RrtConnect;
+                self.branch = joined.branch + 1;
+                self.begin_branch()
+            }
+            None => Step::Failed(MotionFailure::NoClearPath),
+        }
+    }
+
+    /// Puts departure, sampled transfer and approach together.
+    pub(super) fn join(&mut self, tools: &Tools<'_>) -> Step {
+        let first = usize::from(self.depart > 1);
+        let across = self.sampled.path().len().saturating_sub(1);
+        if first + across + usize::from(self.approach.is_some()) > LEGS_MAX {
+            return Step::Failed(MotionFailure::NoClearPath);
+        }
+        for index in 0..across {
+            let [from, to] = [index, index + 1].map(|k| self.sampled.path()[k]);
+            let path = Path::line(&from, &to);
+            self.legs[first + index] = self.leg(tools, &path, MotionPhase::Transfer, [0; 16], tools.params.path_margin);
+        }
+        self.count = first + across;
+        self.finish()
     }
 }

@@ -23,6 +23,7 @@ use crate::plan::Search;
 use crate::reach::Reach;
 use crate::stop::{Causes, StopMonitor};
 use crate::{Params, ParamsError};
+use tandem_policy::{Policies, Surroundings};
 
 /// What the controller reads each cycle: the latest value of each service, heard or not.
 #[derive(Clone, Copy)]
@@ -66,6 +67,8 @@ pub struct Controller {
     effector: Effector,
     search: Search,
     planner: Monitor,
+    policies: Policies,
+    surroundings: Surroundings,
     motion: Motion,
     guard: Guard,
     governor: Governor,
@@ -112,6 +115,8 @@ impl Controller {
             effector: Effector::default(),
             search: Search::new(),
             planner: arm.clone(),
+            policies: Policies::default(),
+            surroundings: Surroundings::default(),
             motion: Motion::new(&chain),
             guard: Guard::new(&chain, arm, params.clearance_min),
             governor: Governor::new(&params.separation),
@@ -127,6 +132,13 @@ impl Controller {
             chain,
             params,
         })
+    }
+
+    /// The same controller with policies that are asked for the way across before anybody else; an arm that has not
+    /// the joints they move goes without.
+    #[must_use]
+    pub fn with_policies(self, policies: Policies) -> Self {
+        if self.chain.joint_count() == tandem_policy::DOF { Self { policies, ..self } } else { self }
     }
 
     /// Runs one cycle: reads the latest inputs, writes the next command and the status.
@@ -176,6 +188,8 @@ impl Controller {
         }
         if heard.human.new {
             self.guard.set_human(inputs.human);
+            let count = (inputs.human.capsule_count as usize).min(inputs.human.capsules.len());
+            self.surroundings.set_person(&inputs.human.capsules[..count]);
             self.human_sigma = inputs.human.position_sigma;
         }
         if heard.scene.good {
@@ -183,6 +197,7 @@ impl Controller {
             if self.scene_key != Some(key) {
                 self.scene_key = Some(key);
                 self.plan_is_current = false;
+                self.surroundings.set_scene(inputs.scene.objects());
                 self.scene_valid = match self.params.workspace.enclose(inputs.scene) {
                     Some((objects, count)) => {
                         let guarded = self.guard.set_scene(&objects[..count]);

@@ -105,8 +105,14 @@ impl Controller {
             self.job.stage = Stage::Planning { begun: true };
             self.plan_is_current = true;
         }
-        let mut tools =
-            Tools { chain: &self.chain, params: &self.params, reach: &self.reach, monitor: &mut self.planner };
+        let mut tools = Tools {
+            chain: &self.chain,
+            params: &self.params,
+            reach: &self.reach,
+            monitor: &mut self.planner,
+            policies: &self.policies,
+            surroundings: &self.surroundings,
+        };
         match self.search.work(&mut tools) {
             Progress::Searching => {}
             Progress::Failed(failure) => {
