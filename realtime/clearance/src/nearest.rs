@@ -101,7 +101,9 @@ pub(crate) fn against<const N: usize>(
                 {
                     continue;
                 }
-                if let Some(bound) = arm.apart_at_least(body, obstacle)
+                // Where any contact will do, the first that comes along does.
+                if enough == f64::NEG_INFINITY
+                    && let Some(bound) = arm.apart_at_least(body, obstacle)
                     && (bound > best.distance || waiting.add(bound, at, index))
                 {
                     continue;
@@ -130,7 +132,8 @@ pub(crate) fn against_itself(arm: &PlacedArm, body: &ArmBody, enough: f64, best:
         if !may_be_nearer(first.squared_gap(second), best.distance + first.radius + second.radius) {
             continue;
         }
-        if let Some(bound) = arm.apart_at_least_each_other(first, second)
+        if enough == f64::NEG_INFINITY
+            && let Some(bound) = arm.apart_at_least_each_other(first, second)
             && (bound > best.distance || waiting.add(bound, a, b))
         {
             continue;
