@@ -215,11 +215,11 @@ impl<'a> Listener<'a> {
         })
     }
 
-    /// From a kill to the supervisor's word that the arm is to pause; none when it was not told to run.
+    /// From a kill to the supervisor's word that the arm is to pause; none when it was not told to run again before.
     fn kill_perception(&mut self) -> Result<Option<Duration>, BenchError> {
         let process = open(snapshot(&self.cell.seat().statistics(Role::Perception)?).pid)?;
         let runs = |task: &MotionTask| matches!(task.run.get(), Some(RunMode::Run | RunMode::Reduced));
-        if !runs(self.task.read()) {
+        if self.until("the arm runs again", |all, _| runs(all.task.read()).then_some(())).is_err() {
             return Ok(None);
         }
         let killed = loops::now();

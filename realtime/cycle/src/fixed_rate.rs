@@ -10,6 +10,8 @@ use crate::{Clock, Grid, Overrun, Record, SharedRecord};
 
 /// Wake-ups whose lateness is measured before the spin tail is set.
 const CALIBRATION: u64 = 500;
+/// Share of the wake-ups a tail is to be long enough for: more than the 99 of 100 that a loop is usually judged by.
+const COVERED: f64 = 0.995;
 /// Share of the period a spin tail may take at most: a loop that spins at FIFO for most of its time is throttled.
 const TAIL_SHARE: u32 = 4;
 
@@ -44,7 +46,7 @@ pub struct Pace {
 /// The kernel wakes a loop some microseconds late. With a *spin tail* the loop
 /// sleeps until a little before its point and spins the rest: it starts with the
 /// longest tail allowed, measures how late the kernel is, and from then on spins
-/// only as long as 99 of 100 wake-ups need.
+/// only as long as 199 of 200 wake-ups need.
 pub struct FixedRate<C, R = SharedRecord> {
     clock: C,
     pacer: Pacer,
@@ -106,7 +108,7 @@ impl<C: Clock, R: Borrow<SharedRecord>> FixedRate<C, R> {
         let wakeups = &self.record.borrow().wakeup;
         wakeups.record(woken.0.saturating_sub(early.0));
         if self.record.borrow().cycles() + 1 == CALIBRATION {
-            self.tail = self.tail_for(wakeups.quantile_ns(0.99));
+            self.tail = self.tail_for(wakeups.quantile_ns(COVERED));
             self.record.borrow().spins(self.tail);
         }
         self.clock.spin_until(deadline)

@@ -216,6 +216,10 @@ impl End for Bus {
 
     fn receive(&mut self) -> Result<u64, BenchError> {
         let (inward, last) = (&mut self.inward, self.last);
+        // Those who connect run at ordinary priority: they need the processors until both sides have met.
+        if last == 0 {
+            inward.wait(PATIENCE);
+        }
         let number = spin(|| {
             let ping = inward.read();
             Ok((ping.header.seq != last).then_some((ping.header.seq, ping.number)))
