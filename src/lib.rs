@@ -4,6 +4,7 @@
 //! say what it decides and what never happens in it.
 
 pub mod bench;
+pub mod black_box;
 pub mod cli;
 pub mod doctor;
 pub mod evaluation;

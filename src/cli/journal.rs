@@ -7,6 +7,7 @@ use comfy_table::{Table, presets};
 use serde_json::json;
 
 use super::{exit, table};
+use crate::black_box;
 use crate::strategy::JournalEntry;
 use crate::strategy::store::{PastRun, Store, StoreError, default_url};
 
@@ -58,7 +59,12 @@ fn answer(args: &JournalArgs) -> Result<(), String> {
     let store = open(args).map_err(|error| error.to_string())?;
     match &args.verb {
         Verb::List => list(&store, args.json).map_err(|error| error.to_string()),
-        Verb::Show { run } => show(&steps(&store, run.as_deref())?, args.json),
+        Verb::Show { run } => {
+            let steps = steps(&store, run.as_deref())?;
+            show(&steps, args.json)?;
+            name_black_boxes(args, &steps);
+            Ok(())
+        }
         Verb::Export { run, output } => export(&steps(&store, run.as_deref())?, output.as_ref()),
     }
 }
@@ -134,6 +140,16 @@ fn show(steps: &[JournalEntry], json: bool) -> Result<(), String> {
         anstream::println!("{}", table::steps(steps));
     }
     Ok(())
+}
+
+/// Names the files that say what led to the run's stops.
+fn name_black_boxes(args: &JournalArgs, steps: &[JournalEntry]) {
+    let url = args.store.clone().map_or_else(|| default_url(&args.cell), Ok);
+    let Some(step) = steps.first() else { return };
+    let Ok(folder) = url.and_then(|url| black_box::folder(&url, &args.cell, &step.run)) else { return };
+    for file in black_box::files(&folder) {
+        anstream::eprintln!("black box of a stop: {}", file.display());
+    }
 }
 
 fn export(steps: &[JournalEntry], output: Option<&PathBuf>) -> Result<(), String> {

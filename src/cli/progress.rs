@@ -131,6 +131,10 @@ fn remark(kind: &EventKind) -> Option<String> {
             let person = separation_m.map(|d| format!(", person at {d:.2} m")).unwrap_or_default();
             format!("STOP category {category}: {cause}, clearance {:.0} mm{person}", clearance_m * 1e3)
         }
+        EventKind::Mode { mode, reason } => {
+            let why = reason.map(|reason| format!(": {reason}")).unwrap_or_default();
+            format!("{mode} speed{why}")
+        }
         EventKind::Resumed { cause, after_s } => format!("resumed {after_s:.1} s after the stop ({cause})"),
         EventKind::Fault { role, fault } => format!("FAULT {role}: {fault}"),
         EventKind::Recovered { role, after_s } => format!("{role} is back after {after_s:.2} s"),

@@ -28,6 +28,9 @@ pub(super) struct RoleArgs {
     /// Seed of the run
     #[arg(long)]
     seed: u64,
+    /// Folder for the records of stops
+    #[arg(long)]
+    stops: Option<PathBuf>,
 }
 
 pub(super) fn role(args: &RoleArgs) -> u8 {
@@ -38,6 +41,7 @@ pub(super) fn role(args: &RoleArgs) -> u8 {
         instance: args.instance.clone(),
         epoch: args.epoch,
         seed: args.seed,
+        stops: args.stops.clone(),
     };
     match live::role(&args) {
         Ok(()) => exit::OK,

@@ -1,6 +1,6 @@
 //! `tandem run`: starts a cell and assembles boxes.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use clap::Args;
@@ -13,6 +13,7 @@ use tandem_msg::Coded;
 
 use super::progress::Screen;
 use super::{check, exit};
+use crate::black_box;
 use crate::live::{self, signals};
 use crate::lockstep::SimCell;
 use crate::strategy::Library;
@@ -81,6 +82,14 @@ pub(super) fn run(args: &RunArgs) -> u8 {
             return exit::CONFIG;
         }
     };
+    let stops = store_url(args.store.as_deref(), &cell).and_then(|url| black_box::folder(&url, &cell.name, &record.id));
+    let stops = match stops {
+        Ok(folder) => folder,
+        Err(error) => {
+            anstream::eprintln!("{error}");
+            return exit::CONFIG;
+        }
+    };
     let options = RunOptions { boxes: args.boxes, seed: args.seed, run_id: record.id.clone() };
     let began = Instant::now();
     let mut screen = (!args.json).then(Screen::new);
@@ -89,9 +98,9 @@ pub(super) fn run(args: &RunArgs) -> u8 {
         None => anstream::println!("{}", serde_json::to_string(event).unwrap_or_default()),
     };
     let ended = if args.lockstep {
-        lockstep(&cell, &mut store, library, options, &mut on_event)
+        lockstep(&cell, &mut store, library, options, &stops, &mut on_event)
     } else {
-        live(&cell, args.product.as_deref(), &mut store, library, options, &mut on_event)
+        live(&cell, args.product.as_deref(), &mut store, library, options, &stops, &mut on_event)
     };
     if let Some(screen) = &screen {
         screen.finish();
@@ -102,7 +111,12 @@ pub(super) fn run(args: &RunArgs) -> u8 {
     }
     match ended {
         Ok(ended) => {
-            report(args, &ended, began.elapsed().as_secs_f64(), &record.id, &store);
+            let black_boxes = black_box::files(&stops);
+            report(args, &ended, began.elapsed().as_secs_f64(), &black_boxes);
+            for file in &black_boxes {
+                anstream::eprintln!("black box of a stop: {}", file.display());
+            }
+            anstream::eprintln!("journal: `tandem journal show {}` (in {})", record.id, store.shown_url());
             exit_code(&ended.outcome)
         }
         Err(refusal) => {
@@ -149,9 +163,11 @@ fn lockstep(
     store: &mut Store,
     library: Library,
     options: RunOptions,
+    stops: &Path,
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Ended, Refusal> {
     let mut sim = SimCell::new(cell, library, options).map_err(Refusal::failed)?;
+    sim.keep_stops(stops);
     signals::listen().map_err(|error| Refusal::failed(format!("signals cannot be handled: {error}")))?;
     let outcome = loop {
         let ended = sim.run(store, on_event, |_| signals::asked() > 0).map_err(Refusal::failed)?;
@@ -169,15 +185,16 @@ fn live(
     store: &mut Store,
     library: Library,
     options: RunOptions,
+    stops: &Path,
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Ended, Refusal> {
-    let ended = live::run(cell, product, library, store, options, on_event)
+    let ended = live::run(cell, product, library, store, options, Some(stops), on_event)
         .map_err(|error| Refusal { message: error.to_string(), exit_code: error.exit_code() })?;
     Ok(Ended { outcome: ended.outcome, summary: ended.summary, loops: ended.loops, restarts: ended.restarts })
 }
 
 /// Prints the summary: the last line of `--json`, or a table.
-fn report(args: &RunArgs, ended: &Ended, wall_time_s: f64, run: &str, store: &Store) {
+fn report(args: &RunArgs, ended: &Ended, wall_time_s: f64, black_boxes: &[PathBuf]) {
     let Ended { outcome, summary, loops, restarts } = ended;
     if args.json {
         for stats in loops {
@@ -187,6 +204,7 @@ fn report(args: &RunArgs, ended: &Ended, wall_time_s: f64, run: &str, store: &St
         line["event"] = json!("summary");
         line["outcome"] = json!(outcome.name());
         line["wall_time_s"] = json!(wall_time_s);
+        line["black_boxes"] = json!(black_boxes);
         anstream::println!("{line}");
     } else {
         anstream::println!("\n{}", table(summary, *restarts, wall_time_s));
@@ -197,7 +215,6 @@ fn report(args: &RunArgs, ended: &Ended, wall_time_s: f64, run: &str, store: &St
     if *outcome != Outcome::Completed {
         anstream::eprintln!("{outcome}");
     }
-    anstream::eprintln!("journal: `tandem journal show {run}` (in {})", store.shown_url());
 }
 
 /// How a role's loop kept its time.

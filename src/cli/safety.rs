@@ -10,7 +10,7 @@ use serde_json::json;
 use tandem_config::Cell;
 
 use super::{check, exit};
-use crate::evaluation::safety::{self, Arm, Behind, Tally};
+use crate::evaluation::safety::{self, Arm, Behind, Tally, Terms};
 
 #[derive(Args)]
 pub(super) struct SafetyArgs {
@@ -23,6 +23,9 @@ pub(super) struct SafetyArgs {
     /// Seed of the first encounter; each has the next
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Cell time of an encounter, s. The person is at the arm within one; in ten there are stops, waits and new starts
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.7, value_parser = seconds)]
+    length: f64,
     /// A thousand encounters and a short look at everything else
     #[arg(long)]
     quick: bool,
@@ -54,9 +57,13 @@ pub(super) fn safety(args: &SafetyArgs) -> u8 {
     let arm = Arm { chain: cell.robot.chain, body: cell.robot.body, params: cell.controller };
     let runs = if args.quick { args.runs.min(1_000) } else { args.runs };
     let began = Instant::now();
-    let tally = watched("encounters", runs, |tick| safety::campaign(&arm, args.seed, runs, false, tick));
-    let unwatched = (runs / 20).max(50);
-    let control = watched("unwatched", unwatched, |tick| safety::campaign(&arm, args.seed, unwatched, true, tick));
+    let cycles = (args.length / arm.params.period.as_secs_f64()).ceil() as u64;
+    let run = |what, runs, blind| {
+        let terms = Terms { cycles, blind };
+        watched(what, runs, |tick| safety::campaign(&arm, args.seed, runs, terms, tick))
+    };
+    let tally = run("encounters", runs, false);
+    let control = run("unwatched", (runs / 20).max(50), true);
     let mut rows = campaign_rows(&tally, &control);
     rows.extend(nuisance_rows(&arm, args));
     // What was measured until then is reported, whatever becomes of the walk-in.
@@ -69,6 +76,14 @@ pub(super) fn safety(args: &SafetyArgs) -> u8 {
     }));
     report(args, &tally, &rows, began.elapsed().as_secs_f64());
     if rows.iter().all(|row| row.met) { exit::OK } else { exit::FAILED }
+}
+
+/// The length of an encounter.
+fn seconds(text: &str) -> Result<f64, String> {
+    const ALLOWED: std::ops::RangeInclusive<f64> = 0.1..=600.0;
+    let length = text.parse().map_err(|_| format!("{text} is no number"))?;
+    let allowed = || format!("allowed {} to {} s", ALLOWED.start(), ALLOWED.end());
+    if ALLOWED.contains(&length) { Ok(length) } else { Err(allowed()) }
 }
 
 /// Runs something of many parts with a bar.
@@ -206,15 +221,19 @@ fn report(args: &SafetyArgs, tally: &Tally, rows: &[Row], wall_time_s: f64) {
     let faults: Vec<_> = tally.faults.iter().map(|(name, count)| format!("{count} {name}")).collect();
     anstream::println!("{table}\n");
     anstream::println!(
-        "{} encounters in {wall_time_s:.0} s: {} cycles, the arm moving in {}, {} stops; tracking {}",
+        "{} encounters of {} s, all in {wall_time_s:.0} s: {} cycles, the arm moving in {}, {} stops; tracking {}",
         tally.runs,
+        args.length,
         tally.cycles,
         tally.moving,
         tally.stops,
         faults.join(", ")
     );
     if !tally.failed.is_empty() {
-        anstream::println!("seeds that failed: {:?} (repeat one with --runs 1 --seed N)", tally.failed);
+        anstream::println!(
+            "seeds that failed: {:?} (repeat one with --runs 1 --seed N, and the same --length)",
+            tally.failed
+        );
     }
     anstream::println!("picture: {}", args.plot.display());
 }

@@ -18,6 +18,7 @@ use tandem_msg::{Coded, Header, Role, Stamp};
 
 use super::shell::{self, Shell};
 use super::{LiveError, rundir, signals};
+use crate::black_box::{Clerk, Keeper};
 use crate::lockstep::build_controller;
 use crate::perception::Perception;
 use crate::plant::Plant;
@@ -45,6 +46,8 @@ pub struct RoleArgs {
     pub epoch: u64,
     /// The run's seed.
     pub seed: u64,
+    /// Where the controller's stops are written down, if they are.
+    pub stops: Option<PathBuf>,
 }
 
 /// Runs one role until SIGTERM; the kernel kills it when its supervisor is gone.
@@ -107,10 +110,20 @@ fn controller(args: &RoleArgs, cell: &Cell, instance: &Instance) -> Result<(), L
     let controller = build_controller(cell).map_err(refused(Role::Controller))?;
     let node = join(args.role, args.epoch, cell, instance);
     let mut role = ControllerRole::open(&node, controller)?;
-    turn(args, cell, instance, move |now| {
+    let keeper = args.stops.clone().map(|folder| Keeper { folder, epoch: args.epoch });
+    // Started before the loop is set up, whose processor and priority it must not inherit.
+    let clerk = keeper.map(Clerk::start).transpose().map_err(LiveError::Threads)?;
+    let left = turn(args, cell, instance, |now| {
         role.cycle(now);
+        if let Some(clerk) = &clerk {
+            clerk.serve(role.controller());
+        }
         role.heard()
-    })
+    });
+    if let Some(clerk) = clerk {
+        clerk.finish(role.controller());
+    }
+    left
 }
 
 /// Sets the calling thread up, waits for the turn of this process and runs the loop until it is asked to end.

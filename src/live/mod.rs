@@ -42,6 +42,7 @@ pub(crate) use rundir::{prepare_base, sweep};
 pub use statistics::{RunningCell, running_cells};
 pub use supervise::Ended;
 
+use std::path::Path;
 use std::sync::mpsc;
 use std::thread;
 
@@ -59,7 +60,7 @@ use warden::Warden;
 
 /// Runs a cell live until its supervisor ends the run, a signal asks for the end,
 /// or a fault leaves no other way. `product` is what the user asked for instead of
-/// the product the cell file names. Events are told in their order, on the calling
+/// the product the cell file names; `stops` is the folder in which stops are written down. Events are told in their order, on the calling
 /// thread, which may take its time.
 ///
 /// SIGINT, SIGTERM and SIGHUP are taken over for good: the first stops the arm and
@@ -74,6 +75,7 @@ pub fn run(
     library: Library,
     store: &mut Store,
     options: RunOptions,
+    stops: Option<&Path>,
     on_event: &mut dyn FnMut(&Event),
 ) -> Result<Ended, LiveError> {
     signals::listen().map_err(LiveError::Signals)?;
@@ -84,6 +86,7 @@ pub fn run(
         product: product.map(str::to_owned),
         run: run_dir.path().to_owned(),
         seed: options.seed,
+        stops: stops.map(Path::to_owned),
         beats: CHILDREN.map(|role| {
             let realtime = cell.realtime.priority[role as usize].is_some();
             realtime.then(|| cell.timing.of(role).period)

@@ -30,6 +30,8 @@ pub(super) struct Plan {
     pub(super) run: PathBuf,
     /// The run's seed.
     pub(super) seed: u64,
+    /// Where the controller's stops are written down, if they are.
+    pub(super) stops: Option<PathBuf>,
     /// Period of each realtime role, in the order of `CHILDREN`: it is looked after by its heartbeat.
     pub(super) beats: [Option<Duration>; 3],
 }
@@ -82,6 +84,9 @@ pub(super) fn spawn(plan: &Plan, role: Role, epoch: u64) -> io::Result<(Child, L
     }
     command.arg("--instance").arg(&plan.run);
     command.args(["--epoch", &epoch.to_string(), "--seed", &plan.seed.to_string()]);
+    if let Some(stops) = &plan.stops {
+        command.arg("--stops").arg(stops);
+    }
     // A pool of threads would only take the loops' processors from them.
     command.env("RAYON_NUM_THREADS", "1");
     command.stdin(Stdio::piped()).stdout(Stdio::null()).stderr(Stdio::piped()).process_group(0);

@@ -11,6 +11,7 @@ mod schedule;
 
 use std::convert::Infallible;
 use std::fmt;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use tandem_bus::{Identity, SlotReader};
@@ -18,6 +19,7 @@ use tandem_config::Cell;
 use tandem_controller::{Controller, ParamsError};
 use tandem_msg::{Coded, Message, MotionStatus, Role, Stamp};
 
+use crate::black_box::Keeper;
 use crate::perception::Perception;
 use crate::plant::Plant;
 use crate::roles::{ControllerRole, MemoryPorts, PerceptionRole, PlantRole, Ports as _, SupervisorRole, Surroundings};
@@ -66,6 +68,8 @@ pub struct SimCell {
     /// Whose turn it was.
     role: Role,
     boxes: u32,
+    /// Where stops are written down, if they are.
+    stops: Option<PathBuf>,
 }
 
 /// A role that does not run.
@@ -104,7 +108,13 @@ impl SimCell {
             now: Stamp::default(),
             role: Role::Supervisor,
             boxes,
+            stops: None,
         })
+    }
+
+    /// Has stops written down in a folder.
+    pub fn keep_stops(&mut self, folder: &Path) {
+        self.stops = Some(folder.to_owned());
     }
 
     /// Kills a role as `kill -9` would; perception and controller come back with a new epoch.
@@ -187,11 +197,33 @@ impl SimCell {
         }
         match role {
             Role::Plant => self.plant.cycle(now),
-            Role::Controller => self.controller.cycle(now),
+            Role::Controller => {
+                self.controller.cycle(now);
+                self.keep_stop();
+            }
             Role::Perception => self.perception.cycle(now),
-            Role::Supervisor => return Ok(self.supervise(now, store, on_event)),
+            Role::Supervisor => {
+                let outcome = self.supervise(now, store, on_event);
+                if let Some(keeper) = self.keeper().filter(|_| outcome.is_some()) {
+                    keeper.keep_last(self.controller.controller());
+                }
+                return Ok(outcome);
+            }
         }
         Ok(None)
+    }
+
+    fn keeper(&self) -> Option<Keeper> {
+        let epoch = self.epochs[Role::Controller.code() as usize];
+        self.stops.clone().map(|folder| Keeper { folder, epoch })
+    }
+
+    fn keep_stop(&mut self) {
+        let Some(stop) = self.controller.controller().fetch_stop() else { return };
+        if let Some(keeper) = self.keeper() {
+            keeper.keep(&stop);
+        }
+        self.controller.controller().give_back(stop);
     }
 
     fn supervise(&mut self, now: Stamp, store: &Store, on_event: &mut dyn FnMut(&Event)) -> Option<Outcome> {

@@ -56,6 +56,11 @@ impl<P: Ports> ControllerRole<P> {
         [self.arm.held().header, self.human.held().header, self.scene.held().header, self.task.held().header]
     }
 
+    /// The role itself, for the records of its stops.
+    pub fn controller(&mut self) -> &mut Controller {
+        &mut self.controller
+    }
+
     /// What was told to everyone in the last cycle.
     pub fn status(&self) -> &MotionStatus {
         &self.outputs.status

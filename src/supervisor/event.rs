@@ -192,6 +192,14 @@ pub enum EventKind {
         /// Clearance at that moment.
         clearance_m: f64,
     },
+    /// The arm is asked to go at another pace.
+    Mode {
+        /// Whose limits hold: normal or reduced.
+        mode: &'static str,
+        /// Why they are not the normal ones.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        reason: Option<&'static str>,
+    },
     /// The arm may move again.
     Resumed {
         /// Why it had been stopped.

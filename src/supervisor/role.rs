@@ -2,6 +2,7 @@
 
 mod acting;
 mod deciding;
+mod pacing;
 mod seeing;
 mod watching;
 
@@ -12,6 +13,7 @@ use super::step::{Line, Work};
 use super::watch::{RoleNews, RoleWatch, StopWatch};
 use super::{RunOptions, SupervisorInputs, SupervisorOutputs};
 use crate::strategy::{JournalEntry, Library, StepState};
+use pacing::Caution;
 use std::time::Duration;
 use tandem_config::{Cell, Part};
 use tandem_msg::{
@@ -84,6 +86,10 @@ pub struct Supervisor {
     /// The prompt that was set aside while a person looks after a stop, and since when they are asked.
     inspecting: Option<(Stamp, Prompt)>,
     roles: RoleWatch,
+    /// Why the arm goes at reduced speed.
+    caution: Option<Caution>,
+    /// A person had to look at the motion under way after a stop.
+    inspected: bool,
     summary: Summary,
 }
 
@@ -126,6 +132,8 @@ impl Supervisor {
             stop: StopWatch::default(),
             inspecting: None,
             roles: RoleWatch::default(),
+            caution: None,
+            inspected: false,
             summary,
         }
     }
@@ -185,7 +193,7 @@ impl Supervisor {
             }
             return;
         }
-        self.task.run = Code::of(RunMode::Run);
+        self.task.run = Code::of(self.pace(inputs, out));
         if self.watch_stop(inputs, out) {
             self.since = self.since.after(passed);
             return;

@@ -1,5 +1,9 @@
 //! What happens to a run when a role dies, or when the user wants the end.
 
+use std::path::Path;
+
+use serde_json::Value;
+use tandem::black_box::files;
 use tandem::supervisor::{EventKind, Outcome};
 use tandem_msg::Role;
 
@@ -44,10 +48,33 @@ fn a_run_survives_the_death_of_perception() {
 #[test]
 fn the_death_of_the_plant_ends_the_run_as_a_fault() {
     let mut rig = carrying(6);
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    rig.sim.keep_stops(folder.path());
     rig.sim.kill(Role::Plant);
     let outcome = rig.finish();
     assert!(matches!(outcome, Outcome::Fault { role: "plant", .. }), "{outcome:?}");
     assert_eq!(outcome.exit_code(), 5);
+    the_stop_is_kept(folder.path());
+}
+
+/// The file of a stop for want of the arm's state: two seconds of a moving arm before it, a stopping one after.
+fn the_stop_is_kept(folder: &Path) {
+    let [file] = &files(folder)[..] else { panic!("{:?}", files(folder)) };
+    let text = std::fs::read_to_string(file).expect("it was just written");
+    let lines: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
+    let (head, cycles) = lines.split_first().expect("a head");
+    assert_eq!((head["cause"].as_str(), head["category"].as_str()), (Some("arm_stale"), Some("1")), "{head}");
+    let times: Vec<f64> = cycles.iter().filter_map(|cycle| cycle["t_s"].as_f64()).collect();
+    assert!(times.len() == cycles.len() && times.len() > 2_000, "{}", times.len());
+    assert!(times.windows(2).all(|pair| (pair[1] - pair[0] - 0.001).abs() < 1e-9), "a gap");
+    for cycle in cycles {
+        let before = cycle["t_s"].as_f64().is_some_and(|time| time < 0.0);
+        assert_eq!(before, cycle["stop"] == "running", "{cycle}");
+        assert_eq!(cycle["command_rad"].as_array().map(Vec::len), Some(6), "{cycle}");
+        assert!(cycle["human_m"].as_array().is_some_and(|people| !people.is_empty()), "{cycle}");
+    }
+    let moving = |cycle: &&Value| cycle["command_rad_s"].as_array().is_some_and(|all| all.iter().any(|v| *v != 0.0));
+    assert!(cycles.iter().filter(moving).count() > 100, "the arm was on its way");
 }
 
 #[test]

@@ -55,24 +55,3 @@ impl Separation {
     /// A number was not finite.
     pub(crate) const LOST: Self = Self { distance: f64::NEG_INFINITY, ..Self::NOBODY };
 }
-
-/// A capsule of the arm, or the carried part, and a capsule of a person.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pairing {
-    /// Link of the arm; the carried part counts as the last.
-    pub link: usize,
-    /// Capsule of the person, its index.
-    pub capsule: usize,
-    /// Signed, metres; −∞ when it came to no number.
-    pub distance: f64,
-    /// Nearest points of the arm and of the person, base frame, metres.
-    pub points: [[f64; 3]; 2],
-}
-
-impl Pairing {
-    #[inline]
-    pub(crate) fn of(near: &Near, link: usize, capsule: usize) -> Self {
-        let distance = if near.distance.is_nan() { f64::NEG_INFINITY } else { near.distance };
-        Self { link, capsule, distance, points: [near.on_first.into(), near.on_second.into()] }
-    }
-}

@@ -7,7 +7,7 @@
 //!
 //! - [`Monitor::clearance`]: the smallest signed distance to the scene and to the
 //!   arm itself, with the link, the object and the points;
-//! - [`Monitor::separation`]: the same towards people, with their velocity; [`Monitor::pairs`]: for each
+//! - [`Monitor::separation`]: the same towards people, with their velocity; [`Monitor::links_to_people`]: for each
 //!   link and body part; [`Monitor::measure`]: clearance and separation at once;
 //! - [`Monitor::track`]: the clearance again, quicker where the arm has moved little;
 //! - [`Monitor::is_clear`], [`Monitor::path_is_clear`]: whether a position, or a whole
@@ -36,6 +36,7 @@ mod mesh;
 mod monitor;
 mod nearest;
 mod obstacle;
+mod people;
 pub mod pfl;
 mod placed;
 mod shapes;
@@ -44,10 +45,11 @@ mod sweep;
 mod targets;
 mod track;
 
-pub use answer::{Clearance, Pairing, Separation};
+pub use answer::{Clearance, Separation};
 pub use body::{ArmBody, BodyError, LINK_CAPSULES_MAX, LinkCapsule, SELF_PAIRS_MAX};
 pub use contacts::{LinkPair, Meeting};
 pub use monitor::Monitor;
 pub use obstacle::SceneFault;
+pub use people::{LinksToPeople, Nearness};
 pub use shapes::{HULL_POINTS_MAX, MESH_TRIANGLES_MAX, ShapeError, Shapes};
 pub use sweep::{MotionSweep, Swept};

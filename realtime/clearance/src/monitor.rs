@@ -7,14 +7,14 @@ use nalgebra::Vector3;
 use tandem_kinematics::LinkPoses;
 use tandem_msg::{AttachedPart, Capsule, HUMAN_CAPSULES_MAX, SCENE_OBJECTS_MAX, SceneObject};
 
-use crate::kernel::Wanted;
 use crate::nearest::{against, against_itself, check, check_own, may_be_nearer};
 use crate::obstacle::{CarriedPart, FAR, Obstacle, SceneFault};
+use crate::people::BodyParts;
 use crate::placed::PlacedArm;
 use crate::shapes::Shapes;
 use crate::targets::Targets;
 use crate::track::Recent;
-use crate::{ArmBody, BodyError, Clearance, Pairing, Separation};
+use crate::{ArmBody, BodyError, Clearance, Separation};
 
 /// Objects a task may allow the tool to touch.
 const TOUCH_MAX: usize = 8;
@@ -31,7 +31,7 @@ pub struct Monitor {
     pub(crate) scene: Targets<SCENE_OBJECTS_MAX>,
     scene_valid: bool,
     people: Targets<HUMAN_CAPSULES_MAX>,
-    velocities: [[f64; 3]; HUMAN_CAPSULES_MAX],
+    pub(crate) parts: BodyParts,
     people_valid: bool,
     pub(crate) part: Option<CarriedPart>,
     part_valid: bool,
@@ -49,7 +49,7 @@ impl Monitor {
             scene: Targets::NONE,
             scene_valid: true,
             people: Targets::NONE,
-            velocities: [[0.0; 3]; HUMAN_CAPSULES_MAX],
+            parts: BodyParts::NONE,
             people_valid: true,
             part: None,
             part_valid: true,
@@ -113,10 +113,10 @@ impl Monitor {
         self.people_valid = capsules.len() <= HUMAN_CAPSULES_MAX && capsules.iter().all(fits);
         self.people.clear();
         if self.people_valid {
-            for (index, (capsule, velocity)) in capsules.iter().zip(&mut self.velocities).enumerate() {
+            for (index, capsule) in capsules.iter().enumerate() {
                 self.people.push(Obstacle::of_person(index as u32, capsule));
-                *velocity = capsule.velocity;
             }
+            self.parts.set(capsules);
         }
     }
 
@@ -201,37 +201,6 @@ impl Monitor {
         all
     }
 
-    /// The pairs of a capsule of the arm, or the carried part, and a capsule of the person that are at most
-    /// `beyond` metres apart, one call of `visit` each. Answers with a bound on how near the others may be:
-    /// never more than the smallest of their distances, +∞ when there is none. −∞, and no call, when a
-    /// number was not finite.
-    pub fn pairs(&self, poses: &LinkPoses, beyond: f64, mut visit: impl FnMut(&Pairing)) -> f64 {
-        let mut arm = self.unplaced(poses);
-        if !arm.place() || !self.part_valid || !self.people_valid {
-            return f64::NEG_INFINITY;
-        }
-        let mut rest = f64::INFINITY;
-        let wanted = Wanted { limit: beyond, enough: f64::NEG_INFINITY };
-        for body in arm.bodies().iter().filter(|body| body.link != 0) {
-            let gaps = self.people.squared_gaps(&body.centre, &body.half);
-            for (index, (person, gap)) in self.people.all().iter().zip(gaps).enumerate() {
-                let radii = body.radius + self.people.around(index);
-                let near = may_be_nearer(gap, beyond + radii).then(|| arm.near(body, person, wanted)).flatten();
-                match near {
-                    Some(near) => visit(&Pairing::of(&near, body.link, index)),
-                    None if may_be_nearer(gap, rest + radii) => rest = gap.sqrt() - radii,
-                    None => {}
-                }
-            }
-        }
-        rest
-    }
-
-    /// The velocity of each capsule of the people in view, m/s.
-    pub fn human_velocities(&self) -> &[[f64; 3]] {
-        &self.velocities[..self.people.all().len()]
-    }
-
     /// Capsules of the people in view.
     pub fn human_count(&self) -> usize {
         self.people.all().len()
@@ -240,6 +209,15 @@ impl Monitor {
     /// Whether scene and part are such that anything can be said at all.
     pub(crate) fn is_sound(&self) -> bool {
         self.scene_valid && self.part_valid
+    }
+
+    /// Whether people and part are such that a distance between them can be said.
+    pub(crate) fn people_are_sound(&self) -> bool {
+        self.part_valid && self.people_valid
+    }
+
+    pub(crate) fn people(&self) -> &Targets<HUMAN_CAPSULES_MAX> {
+        &self.people
     }
 
     /// The scene.
@@ -309,7 +287,7 @@ impl Monitor {
             link: best.link,
             capsule,
             direction: direction.unwrap_or_else(Vector3::zeros).into(),
-            human_velocity: self.velocities[capsule],
+            human_velocity: self.parts.velocity(capsule),
             point_on_arm: best.point_on_arm,
         }
     }

@@ -15,7 +15,11 @@
 //!
 //! **Moving away.** The speeds of the formula are those towards each other. Where
 //! the policy says so, a link owes nothing to a body part it moves away from and
-//! which does not follow it: to slow it down would only keep it there longer.
+//! which does not follow it: to slow it down would only keep it there longer. An arm that
+//! waits does not start on these terms unless everybody near it stands, at a
+//! hand-over for a while: whoever moves is let pass first, and takes the part away first.
+
+use core::time::Duration;
 
 use tandem_clearance::ssm::{self, Gait};
 use tandem_msg::Stamp;
@@ -35,6 +39,8 @@ pub(crate) const FAR: f64 = 2.0;
 const SLOWER: f64 = 0.999;
 /// Somebody slower than this stands, m/s.
 const STANDING: f64 = 0.1;
+/// Hands at the tool are about to take the part away; those that have stood so long are not.
+const HAND_OVER_PATIENCE: Duration = Duration::from_secs(1);
 
 /// What a stop takes that does not begin at once.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +51,17 @@ pub(crate) struct Halt {
     pub(crate) way: f64,
     /// Seconds of braking.
     pub(crate) duration: f64,
+}
+
+/// Who is owed nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Credit {
+    /// A body part that a stop from here leads away from.
+    Left,
+    /// One that the arm would leave further when it goes on.
+    LeftForGood,
+    /// Nobody.
+    None,
 }
 
 /// What there is beyond what is owed, and to whom.
@@ -74,6 +91,9 @@ pub(crate) struct Governor {
     level: usize,
     /// Since when there is room to speed up to each level.
     room_since: [Option<Stamp>; LEVELS.len()],
+    /// Since when everybody near has stood, on the present path, and how long they must have for the arm to start.
+    stood_since: Option<Stamp>,
+    patience: Duration,
 }
 
 impl Governor {
@@ -86,12 +106,16 @@ impl Governor {
             jerk: 1.0,
             level: 0,
             room_since: [None; LEVELS.len()],
+            stood_since: None,
+            patience: Duration::ZERO,
         }
     }
 
-    /// Prepares for a path.
-    pub(crate) fn take(&mut self, limits: &LawLimits) -> Result<(), Refused> {
+    /// Prepares for a path; `with_person` when somebody takes from the tool, or holds, what it lets go of.
+    pub(crate) fn take(&mut self, limits: &LawLimits, with_person: bool) -> Result<(), Refused> {
         self.level = 0;
+        self.stood_since = None;
+        self.patience = if with_person { HAND_OVER_PATIENCE } else { Duration::ZERO };
         self.acceleration = limits.acceleration;
         self.jerk = limits.jerk;
         for ((stop, speed), share) in self.stops.iter_mut().zip(&mut self.speeds).zip(LEVELS) {
@@ -161,18 +185,22 @@ impl Governor {
         })
     }
 
-    /// The pair that has least to spare if the arm were stopped so; of a pair that it leaves, `to_go_on`
-    /// asks that it would leave it further.
-    fn margin_of(&self, people: &People, halt: &Halt, to_go_on: bool) -> Margin {
+    /// The pair that has least to spare if the arm were stopped so.
+    fn margin_of(&self, people: &People, halt: &Halt, credit: Credit) -> Margin {
         let standing = self.owed_standing(halt, people.age, people.sigma, f64::NEG_INFINITY);
         // Length to metres, by what was measured ahead. What the arm does before it brakes is part of that way.
         let scale = if people.way > 0.0 { halt.way / people.way } else { 0.0 };
         let away = if people.way > 0.0 { halt.velocity / people.way } else { 0.0 };
         let mut least = Margin { spare: f64::INFINITY, owed: 0.0, pair: people.nearest };
         for pair in people.pairs() {
+            let credited = match credit {
+                Credit::Left => true,
+                Credit::LeftForGood => pair.leaves,
+                Credit::None => false,
+            };
             let left = self.params.recede
+                && credited
                 && pair.retreat > 0.0
-                && (pair.leaves || !to_go_on)
                 && pair.distance > 0.0
                 && pair.closing <= (away * pair.retreat).max(STANDING);
             if left {
@@ -194,7 +222,7 @@ impl Governor {
 
     /// The pair that has least to spare if the arm were stopped so.
     pub(crate) fn margin(&self, people: &People, halt: &Halt) -> Margin {
-        self.margin_of(people, halt, false)
+        self.margin_of(people, halt, Credit::Left)
     }
 
     /// The margin of an arm at rest before it may start.
@@ -226,11 +254,19 @@ impl Governor {
             self.level = LEVELS.len();
             return self.level;
         }
-        let delay = if standing && self.level == 0 { self.params.resume_delay } else { self.params.speed_up_delay };
-        let braking = !standing && !(self.margin_of(people, halt, true).spare >= self.params.reserve);
+        if people.pairs().iter().all(|pair| pair.speed <= STANDING) {
+            self.stood_since.get_or_insert(now);
+        } else {
+            self.stood_since = None;
+        }
+        let waits = standing && self.level == 0;
+        let delay = if waits { self.params.resume_delay } else { self.params.speed_up_delay };
+        let stood = self.stood_since.is_some_and(|since| since.age_at(now) >= self.patience);
+        let credit = if waits && !stood { Credit::None } else { Credit::LeftForGood };
+        let braking = !standing && !(self.margin_of(people, halt, Credit::LeftForGood).spare >= self.params.reserve);
         let mut best = 0;
         for index in 0..LEVELS.len() {
-            let spare = self.margin_of(people, &self.halt_from(index, velocity), true).spare;
+            let spare = self.margin_of(people, &self.halt_from(index, velocity), credit).spare;
             let room = spare >= self.params.reserve + self.params.hysteresis;
             let since = &mut self.room_since[index];
             *since = if room { since.or(Some(now)) } else { None };
@@ -248,7 +284,6 @@ impl Governor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use core::time::Duration;
 
     /// Slower than the slowest level.
     const SLOW: Halt = Halt { velocity: 0.01, way: 0.001, duration: 0.02 };
@@ -262,7 +297,7 @@ mod tests {
     fn governor_of(params: &SeparationParams) -> Governor {
         let mut governor = Governor::new(params);
         let limits = LawLimits { velocity: 1.0, acceleration: 5.0, jerk: 50.0 };
-        governor.take(&limits).expect("limits are usable");
+        governor.take(&limits, false).expect("limits are usable");
         governor
     }
 
@@ -349,5 +384,25 @@ mod tests {
         people.first().leaves = true;
         let levels = [0, 100_000_000].map(|at| governor.choose(Stamp(at), &people, &halt));
         assert_eq!(levels[1], LEVELS.len());
+    }
+
+    /// An arm that waits starts past a hand that stands where it leaves it, at a hand-over only after a while; not past
+    /// one that moves, whichever way.
+    #[test]
+    fn an_arm_that_waits_lets_others_go_first() {
+        let rest = Halt { velocity: 0.0, way: 0.0, duration: 0.0 };
+        for (with_person, starts_ms) in [(false, 200), (true, 1_200)] {
+            let mut governor = governor_of(&SeparationParams::default());
+            let limits = LawLimits { velocity: 1.0, acceleration: 5.0, jerk: 50.0 };
+            governor.take(&limits, with_person).expect("limits are usable");
+            let mut people = People::at(0.05);
+            *people.first() = Pair { retreat: 0.1, leaves: true, closing: -0.3, speed: 0.3, ..*people.first() };
+            for ms in 0..3_000 {
+                assert_eq!(governor.choose(Stamp(ms * 1_000_000), &people, &rest), 0, "{ms} ms: it moves");
+            }
+            (people.first().closing, people.first().speed) = (0.0, 0.0);
+            let started = (3_000..6_000).find(|ms| governor.choose(Stamp(ms * 1_000_000), &people, &rest) > 0);
+            assert_eq!(started, Some(3_000 + starts_ms));
+        }
     }
 }

@@ -146,7 +146,7 @@ impl Guard {
     pub(crate) fn measure(&mut self, chain: &Chain, position: &Joints) {
         if self.stale || *position != self.at {
             self.poses = chain.forward(position);
-            self.clearance = self.monitor.clearance(&self.poses);
+            self.clearance = self.monitor.track(&self.poses);
             self.at = *position;
             self.stale = false;
         }

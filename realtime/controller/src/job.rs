@@ -84,6 +84,11 @@ impl Job {
         if self.away { &self.task.attached_after } else { &self.task.attached_before }
     }
 
+    /// Whether a person takes from the tool, or works on, what it holds.
+    pub(crate) fn is_with_person(&self) -> bool {
+        self.task.subtask.is(Subtask::HandOver) || self.task.subtask.is(Subtask::HoldStill)
+    }
+
     /// What may be touched at the goal.
     pub(crate) fn touch(&self) -> Touch {
         let mut touch = [0; 16];

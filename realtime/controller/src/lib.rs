@@ -16,6 +16,7 @@
 //! | search a path | `plan`, `line`, `reach`, `sweep` |
 //! | follow it | `path`, `law`, `motion` |
 //! | check the next command | `guard`, `people`, `governor`, `pace`, `workspace`, `envelope` |
+//! | keep what led to a stop | `black_box` |
 //!
 //! **Invariant:** an arm that engages is met where it is: the first command
 //! continues its measured position and velocity.
@@ -27,6 +28,7 @@
 
 #![allow(clippy::neg_cmp_op_on_partial_ord, reason = "`!(a >= b)` is meant: what is no number fails the check")]
 
+mod black_box;
 mod effector;
 mod envelope;
 mod governor;
@@ -47,6 +49,7 @@ mod stop;
 mod sweep;
 mod workspace;
 
+pub use black_box::{Record, StopRecord};
 pub use params::{OutOfRange, Params, ParamsError, SeparationParams};
 pub use plan::policy_for;
 pub use role::{Controller, ControllerInputs, ControllerOutputs};

@@ -10,7 +10,7 @@ use core::time::Duration;
 
 use tandem_clearance::pfl;
 use tandem_kinematics::Chain;
-use tandem_msg::{BodyPart, MotionPhase, SafetyMode, Stamp, Subtask};
+use tandem_msg::{BodyPart, MotionPhase, SafetyMode, Stamp};
 
 use crate::Params;
 use crate::job::Job;
@@ -50,8 +50,7 @@ impl Pace {
     pub(crate) fn take(&mut self, chain: &Chain, leg: &Leg, job: &Job, params: &Params, recovering: bool) {
         let peak = leg.path.tcp_rate(chain) * leg.limits.velocity;
         let share = |speed: f64| if peak > speed { speed / peak } else { 1.0 };
-        let at_person = job.task.subtask.is(Subtask::HandOver) || job.task.subtask.is(Subtask::HoldStill);
-        let near_person = at_person && leg.phase != MotionPhase::Transfer;
+        let near_person = job.is_with_person() && leg.phase != MotionPhase::Transfer;
         self.recovering = recovering;
         self.reduced_share = share(params.reduced_speed_max);
         self.recovery_share = share(params.recovery_speed_max);

@@ -1,15 +1,15 @@
 //! Where people are to the arm, link by link and body part by body part.
 //!
-//! Each pair of a link and a body part is measured at four places: where the
+//! Each pair of a link and a body part is measured at three places: where the
 //! next set-point is, and halfway to and at the end of the way the arm would
-//! still make if it were told to stop; and once beyond it. What decides is the pair that has least
+//! still make if it were told to stop; and once beyond it if the arm leaves it. What decides is the pair that has least
 //! to spare, which need not be the nearest: a forearm at one side that the arm
 //! moves to counts before a trunk at the other that it leaves.
 //!
 //! Between two places that are a travel `l` apart a distance falls at most
 //! `d - sqrt(d² - (l/2)²)` below the smaller of both, the case of a point passed by.
 
-use tandem_clearance::Monitor;
+use tandem_clearance::{LinksToPeople, Monitor};
 use tandem_kinematics::{Chain, LinkPoses};
 use tandem_msg::{HUMAN_CAPSULES_MAX, JOINTS_MAX};
 
@@ -34,6 +34,8 @@ pub(crate) struct Pair {
     pub(crate) leaves: bool,
     /// Measured speed of the body part towards the link, m/s.
     pub(crate) closing: f64,
+    /// Measured speed of the body part, whichever way, m/s.
+    pub(crate) speed: f64,
 }
 
 impl Pair {
@@ -45,6 +47,7 @@ impl Pair {
         retreat: 0.0,
         leaves: false,
         closing: f64::NEG_INFINITY,
+        speed: 0.0,
     };
 }
 
@@ -75,10 +78,6 @@ pub(crate) struct Ahead<'a> {
     /// Bound on the travel of any point of the arm per length.
     pub(crate) rate: f64,
 }
-
-/// The smallest distance of each link to each body part.
-type Table = [[f64; HUMAN_CAPSULES_MAX]; JOINTS_MAX];
-const FAR: Table = [[f64::INFINITY; HUMAN_CAPSULES_MAX]; JOINTS_MAX];
 
 impl People {
     pub(crate) fn nobody() -> Self {
@@ -131,57 +130,51 @@ impl People {
     ) {
         (self.count, self.nearest) = (0, Pair::NONE);
         (self.age, self.sigma, self.way) = (age, sigma, ahead.map_or(0.0, |ahead| ahead.way));
-        let mut table = FAR;
-        let mut points = [[[[0.0; 3]; 2]; HUMAN_CAPSULES_MAX]; JOINTS_MAX];
-        let rest = monitor.pairs(here, horizon, |seen| {
-            let (row, column) = (seen.link.saturating_sub(1).min(JOINTS_MAX - 1), seen.capsule % HUMAN_CAPSULES_MAX);
-            if seen.distance < table[row][column] {
-                table[row][column] = seen.distance;
-                points[row][column] = seen.points;
-            }
-        });
-        self.nearest.distance = rest;
-        if rest == f64::NEG_INFINITY {
-            return self.add(Pair { distance: rest, ..Pair::NONE });
+        if monitor.human_count() == 0 {
+            return;
         }
-        for (row, (distances, points)) in table.iter().zip(&points).enumerate() {
-            for (capsule, velocity) in monitor.human_velocities().iter().enumerate() {
-                let distance = distances[capsule];
-                if distance < f64::INFINITY {
-                    let closing = closing(&points[capsule], distance, velocity);
-                    self.add(Pair { capsule, link: row + 1, distance, closing, ..Pair::NONE });
+        let Some(table) = monitor.links_to_people(here) else {
+            return self.add(Pair { distance: f64::NEG_INFINITY, ..Pair::NONE });
+        };
+        let mut speeds = [0.0; HUMAN_CAPSULES_MAX];
+        for (capsule, speed) in speeds.iter_mut().enumerate().take(monitor.human_count()) {
+            *speed = monitor.human_speed(capsule);
+        }
+        for (row, parts) in table.iter().enumerate() {
+            for (capsule, seen) in parts.iter().take(monitor.human_count()).enumerate() {
+                let (distance, closing, speed) = (seen.distance, seen.closing, speeds[capsule]);
+                let pair = Pair { capsule, link: row + 1, distance, closing, speed, ..Pair::NONE };
+                // Written so that what is no number counts.
+                if !(seen.distance > horizon) {
+                    self.add(pair);
+                } else if seen.distance < self.nearest.distance {
+                    self.nearest = pair;
                 }
             }
         }
         if let Some(ahead) = ahead
             && self.count > 0
         {
-            self.look(monitor, chain, ahead, horizon);
+            self.look(monitor, chain, ahead);
         }
     }
 
-    /// Measures the pairs found halfway and at the end of the way ahead.
-    fn look(&mut self, monitor: &Monitor, chain: &Chain, ahead: &Ahead<'_>, horizon: f64) {
+    /// Measures the pairs found halfway and at the end of the way ahead, and, of those the arm leaves, beyond.
+    fn look(&mut self, monitor: &Monitor, chain: &Chain, ahead: &Ahead<'_>) {
         let travel = ahead.rate * ahead.way;
-        let table_at = |length: f64| {
-            let mut table = FAR;
-            let poses = chain.forward(&ahead.path.at(ahead.from + length).position);
-            // Wide enough to see every pair again that was within the horizon.
-            let rest = monitor.pairs(&poses, horizon + ahead.rate * length, |seen| {
-                let row = seen.link.saturating_sub(1).min(JOINTS_MAX - 1);
-                let slot = &mut table[row][seen.capsule % HUMAN_CAPSULES_MAX];
-                *slot = slot.min(seen.distance);
-            });
-            if rest == f64::NEG_INFINITY { [[rest; HUMAN_CAPSULES_MAX]; JOINTS_MAX] } else { table }
-        };
-        let [halfway, at_end, onward] = [0.5 * ahead.way, ahead.way, ahead.onward].map(table_at);
+        let table_at =
+            |length: f64| monitor.links_to_people(&chain.forward(&ahead.path.at(ahead.from + length).position));
+        let [halfway, at_end] = [0.5 * ahead.way, ahead.way].map(table_at);
+        let mut onward = None;
         for pair in &mut self.pairs[..self.count.min(PAIRS_MAX)] {
-            let row = pair.link.saturating_sub(1).min(JOINTS_MAX - 1);
-            let column = pair.capsule % HUMAN_CAPSULES_MAX;
-            let (here, half, end) = (pair.distance, halfway[row][column], at_end[row][column]);
+            let there = |table: &Option<LinksToPeople>| {
+                let row = pair.link.saturating_sub(1).min(JOINTS_MAX - 1);
+                table.as_ref().map_or(f64::NEG_INFINITY, |table| table[row][pair.capsule % HUMAN_CAPSULES_MAX].distance)
+            };
+            let (here, half, end) = (pair.distance, there(&halfway), there(&at_end));
             if here <= half && half <= end {
                 pair.retreat = end - here;
-                pair.leaves = end <= onward[row][column];
+                pair.leaves = end <= there(onward.get_or_insert_with(|| table_at(ahead.onward)));
                 continue;
             }
             let low = here.min(half).min(end);
@@ -189,24 +182,5 @@ impl People {
             let dip = if low > chord { low - (low * low - chord * chord).sqrt() } else { chord };
             pair.approach = (here - low + dip).max(0.0).min(travel);
         }
-    }
-}
-
-/// Speed of a body part towards the arm, from their nearest points, m/s.
-fn closing(points: &[[f64; 3]; 2], distance: f64, velocity: &[f64; 3]) -> f64 {
-    let [arm, person] = points;
-    let mut sum = 0.0;
-    let mut square = 0.0;
-    for axis in 0..3 {
-        let apart = person[axis] - arm[axis];
-        sum += apart * velocity[axis];
-        square += apart * apart;
-    }
-    if square > 1e-18 {
-        // Overlapping, the points have changed sides.
-        -sum / square.sqrt() * if distance < 0.0 { -1.0 } else { 1.0 }
-    } else {
-        // No direction: as if straight at it.
-        velocity.iter().map(|v| v * v).sum::<f64>().sqrt()
     }
 }

@@ -16,7 +16,7 @@ fn ten_thousand_cycles_allocate_nothing() {
     let mut id = 0;
     let mut phases = std::collections::BTreeSet::new();
     let mut causes = std::collections::BTreeSet::new();
-    let mut moved = 0;
+    let (mut moved, mut fetched) = (0, 0);
     for cycle in 0..12_000 {
         if id == 0 || matches!(cell.phase(), MotionPhase::Done | MotionPhase::Failed) {
             id += 1;
@@ -42,7 +42,13 @@ fn ten_thousand_cycles_allocate_nothing() {
             10_500 => cell.arm.position[0] = f64::NAN,
             _ => {}
         }
-        let ((), calls) = counted(|| cell.step());
+        let ((), calls) = counted(|| {
+            cell.step();
+            if let Some(stop) = cell.controller.fetch_stop() {
+                fetched += 1;
+                cell.controller.give_back(stop);
+            }
+        });
         assert!(calls.is_none(), "cycle {cycle}: {calls:?} {:#?}", cell.status());
         phases.insert(cell.phase());
         causes.insert(cell.cause());
@@ -57,5 +63,6 @@ fn ten_thousand_cycles_allocate_nothing() {
     for cause in [StopCause::HumanStale, StopCause::TrackingError, StopCause::InputInvalid] {
         assert!(causes.contains(&cause), "{cause} never happened: {causes:?}");
     }
+    assert!(fetched >= 2, "{fetched} stops recorded");
     assert!(moved > 3_000, "{moved} cycles of motion");
 }

@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 pub use nuisance::{Behind, crossing, passers_by, withdrawal};
 pub use tracking::Fault;
-pub use trial::{Arm, Outcome, encounter};
+pub use trial::{Arm, Outcome, Terms, encounter};
 pub use walk_in::{Sample, WalkIn, walk_in};
 
 /// Sums over encounters.
@@ -99,9 +99,8 @@ impl Tally {
     }
 }
 
-/// Runs the encounters of `runs` seeds from `seed` on; with `blind` the controller is told of nobody.
-/// `progress` is told how many are done, now and then.
-pub fn campaign(arm: &Arm, seed: u64, runs: u64, blind: bool, progress: &(dyn Fn(u64) + Sync)) -> Tally {
+/// Runs the encounters of `runs` seeds from `seed` on. `progress` is told how many are done, now and then.
+pub fn campaign(arm: &Arm, seed: u64, runs: u64, terms: Terms, progress: &(dyn Fn(u64) + Sync)) -> Tally {
     let threads = std::thread::available_parallelism().map_or(1, usize::from);
     let (next, done) = (AtomicU64::new(0), AtomicU64::new(0));
     let work = || {
@@ -112,7 +111,7 @@ pub fn campaign(arm: &Arm, seed: u64, runs: u64, blind: bool, progress: &(dyn Fn
                 return tally;
             }
             let seed = seed.wrapping_add(run);
-            tally.add(seed, &encounter(arm, seed, blind));
+            tally.add(seed, &encounter(arm, seed, terms));
             progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         }
     };

@@ -27,7 +27,8 @@ pub enum Fault {
     Jitter(u64),
     /// From this cycle on there are no more samples.
     Killed(u64),
-    /// From this cycle on the last picture is repeated under fresh stamps.
+    /// From this cycle on the last picture of the person is repeated under fresh stamps. (A picture of nobody that is
+    /// repeated is what a tracker shows of an empty cell; only the sensor itself can tell the two apart.)
     Frozen(u64),
     /// From this cycle on, for so many, a number is not finite.
     Garbage(u64, u64),
@@ -44,7 +45,7 @@ impl Fault {
             2..=4 => Self::Late(whole(1, 10)),
             5 => Self::Jitter(whole(1, 10)),
             6 => Self::Killed(whole(0, 900)),
-            7 => Self::Frozen(whole(0, 900)),
+            7 => Self::Frozen(whole(1, 900)),
             8 => Self::Garbage(whole(0, 900), whole(1, 50)),
             _ => Self::Lost(whole(2, 10)),
         }

@@ -13,14 +13,8 @@ use super::referee::{Referee, reach};
 use super::tracking::{Fault, Tracking};
 use super::world::{World, between, free_position, scene, transfer};
 
-/// Cycles an encounter may take.
-const CYCLES: u64 = 700;
 /// Cycles an arm may take until it moves.
 const PREPARATION: u64 = 400;
-/// An arm that has stood this many cycles beside a person will not be touched while moving any more.
-const STOOD: u64 = 40;
-/// Farther than this the person has left, metres.
-const LEFT: f64 = 1.7;
 /// What an exact monitor reckons for a stop from the slowest speed, s.
 pub(super) const SLOWEST_STOP: f64 = 0.05;
 
@@ -40,6 +34,16 @@ impl Arm {
     pub(super) fn hasty(&self) -> Params {
         Params { planning_work: 100, settle: std::time::Duration::ZERO, ..self.params }
     }
+}
+
+/// What all encounters of a campaign have in common.
+#[derive(Clone, Copy, Debug)]
+pub struct Terms {
+    /// Cycles with the person there. In the time of one approach hardly anything but the approach happens; in a
+    /// longer one the arm also stops, waits, starts again and plans anew with the person beside it.
+    pub cycles: u64,
+    /// The controller is told of nobody.
+    pub blind: bool,
 }
 
 /// What became of one encounter.
@@ -69,8 +73,8 @@ pub struct Outcome {
     pub overrun: f64,
 }
 
-/// Runs the encounter of a seed; with `blind` the controller is told of nobody.
-pub fn encounter(arm: &Arm, seed: u64, blind: bool) -> Outcome {
+/// Runs the encounter of a seed.
+pub fn encounter(arm: &Arm, seed: u64, terms: Terms) -> Outcome {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let params = arm.hasty();
     let scene = scene(&mut random, &arm.chain, &arm.body, &params.home, 20);
@@ -78,7 +82,7 @@ pub fn encounter(arm: &Arm, seed: u64, blind: bool) -> Outcome {
     // What was added was accepted one by one.
     let _ = monitor.set_scene(scene.objects());
     let start = free_position(&mut random, &arm.chain, &monitor, &params.home);
-    let fault = if blind { Fault::None } else { Fault::draw(&mut random) };
+    let fault = if terms.blind { Fault::None } else { Fault::draw(&mut random) };
     let sigma = [0.0, 0.002, 0.005, 0.01][(between(&mut random, 0.0, 4.0) as usize).min(3)];
     // A source that claims to be exact cannot be told from one that is frozen.
     let sigma = if matches!(fault, Fault::Frozen(_)) { f64::max(sigma, 0.002) } else { sigma };
@@ -126,12 +130,11 @@ pub fn encounter(arm: &Arm, seed: u64, blind: bool) -> Outcome {
         needless: 0,
         overrun: 0.0,
     };
-    let mut stood = 0;
     let mut braking: Option<(u64, f64)> = None;
-    for cycle in 0..CYCLES {
+    for cycle in 0..terms.cycles {
         work(&mut world, &mut random);
         person.live(params.period.as_secs_f64(), &referee.target, &referee.distances);
-        let told = (!blind).then_some(&person);
+        let told = (!terms.blind).then_some(&person);
         let human = *tracking.tell(world.now.after(params.period), told);
         let announced = world.status().stopping_time;
         world.step(&human);
@@ -154,10 +157,6 @@ pub fn encounter(arm: &Arm, seed: u64, blind: bool) -> Outcome {
         if world.kept() {
             outcome.waiting += 1;
             outcome.needless += u64::from(seen.distance > reach(params.period.as_secs_f64() + SLOWEST_STOP));
-        }
-        stood = if world.moving() { 0 } else { stood + 1 };
-        if stood >= STOOD || seen.distance > LEFT {
-            break;
         }
     }
     outcome.stops = world.status().stop_count;

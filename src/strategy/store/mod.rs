@@ -19,7 +19,7 @@ mod url;
 pub use error::StoreError;
 pub use history::PastRun;
 pub use journal::RunRecord;
-pub use url::{default_url, shown};
+pub use url::{default_url, shown, state_folder};
 
 use super::{JournalEntry, Library};
 use sqlx::any::AnyPoolOptions;

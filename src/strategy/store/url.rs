@@ -63,11 +63,19 @@ pub fn shown(url: &str) -> String {
 /// # Errors
 /// Neither variable is set, or the folder cannot be made.
 pub fn default_url(cell: &str) -> Result<String, StoreError> {
-    let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
-    let state = absolute("XDG_STATE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".local/state")));
-    let folder = state.ok_or(StoreError::NoStateFolder)?.join("tandem");
+    let folder = state_folder()?;
     make_folder(&folder)?;
     Ok(format!("sqlite://{}", folder.join(format!("{cell}.db")).display()))
+}
+
+/// Where what lasts is kept for this user: `$XDG_STATE_HOME/tandem`, or `~/.local/state/tandem`.
+///
+/// # Errors
+/// Neither variable is set.
+pub fn state_folder() -> Result<PathBuf, StoreError> {
+    let absolute = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let state = absolute("XDG_STATE_HOME").or_else(|| absolute("HOME").map(|home| home.join(".local/state")));
+    Ok(state.ok_or(StoreError::NoStateFolder)?.join("tandem"))
 }
 
 fn make_folder(folder: &Path) -> Result<(), StoreError> {

@@ -192,6 +192,7 @@ impl Supervisor {
         }
         let moved = matches!(current.operation, Operation::Motion(_));
         self.summary.planned.count(current.planner);
+        self.inspected &= !moved;
         self.say(
             out,
             EventKind::ActionDone {

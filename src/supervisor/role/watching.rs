@@ -102,6 +102,7 @@ impl Supervisor {
         match self.answer(inputs, out) {
             Some(Answer::Done) => {
                 self.inspecting = None;
+                self.inspected = true;
                 self.stop.seen_by_person();
                 self.task.reset_count += 1;
                 // What they were at before is asked anew.

@@ -11,6 +11,7 @@ mod cylinder;
 mod depth;
 mod gjk;
 mod segment;
+mod segments;
 mod simplex;
 
 pub(crate) use self::core::{Core, core_to_core};
@@ -18,6 +19,7 @@ pub(crate) use boxes::{OrientedBox, box_to_box};
 pub(crate) use cylinder::segment_to_cylinder;
 pub(crate) use gjk::Wanted;
 pub(crate) use segment::{point_to_segment, segment_to_segment};
+pub(crate) use segments::Segments;
 pub(crate) use simplex::nearest_of_triangle;
 
 use nalgebra::Vector3;

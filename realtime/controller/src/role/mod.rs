@@ -12,6 +12,7 @@ use tandem_msg::{
     RunMode, Scene, Stamp, StopCategory, StopCause, StopState,
 };
 
+use crate::black_box::{BlackBox, Record, StopRecord};
 use crate::effector::Effector;
 use crate::governor::{Governor, Margin};
 use crate::guard::Guard;
@@ -85,6 +86,7 @@ pub struct Controller {
     stopping_time: f64,
     tcp_speed: f64,
     base_from_tcp: tandem_msg::Pose,
+    black_box: BlackBox,
 }
 
 impl Controller {
@@ -129,6 +131,7 @@ impl Controller {
             stopping_time: 0.0,
             tcp_speed: 0.0,
             base_from_tcp: tandem_msg::Pose::IDENTITY,
+            black_box: BlackBox::new(params.period, chain.joint_count()),
             chain,
             params,
         })
@@ -170,6 +173,29 @@ impl Controller {
         self.job.clearance_min = self.job.clearance_min.min(self.guard.clearance().distance);
         self.command(now, heard.arm.good, &mut outputs.command);
         self.status(now, &mut outputs.status);
+        self.black_box.record(&self.record(now, &outputs.status), self.stop.count(), self.stop.category());
+    }
+
+    /// The record of a stop that has not been fetched yet. It is to be given back when it has been written down.
+    ///
+    /// # Realtime
+    /// The box changes hands, nothing else.
+    #[allow(clippy::disallowed_types, reason = "made at start")]
+    pub fn fetch_stop(&mut self) -> Option<Box<StopRecord>> {
+        self.black_box.fetch()
+    }
+
+    /// The records of stops at the end of a run, one a call, the last of them as far as it got. Nothing is recorded
+    /// after that.
+    #[allow(clippy::disallowed_types, reason = "made at start")]
+    pub fn last_stops(&mut self) -> Option<Box<StopRecord>> {
+        self.black_box.end()
+    }
+
+    /// Takes the record of a stop back.
+    #[allow(clippy::disallowed_types, reason = "made at start")]
+    pub fn give_back(&mut self, record: Box<StopRecord>) {
+        self.black_box.give_back(record);
     }
 
     /// Keeps what may be used of this cycle's samples.
@@ -191,6 +217,7 @@ impl Controller {
             let count = (inputs.human.capsule_count as usize).min(inputs.human.capsules.len());
             self.surroundings.set_person(&inputs.human.capsules[..count]);
             self.human_sigma = inputs.human.position_sigma;
+            self.black_box.see(inputs.human);
         }
         if heard.scene.good {
             let key = (inputs.scene.header.epoch, inputs.scene.version);
@@ -345,5 +372,29 @@ impl Controller {
             scene_version: self.scene_key.map_or(0, |(_, version)| version),
             base_from_tcp: self.base_from_tcp,
         };
+    }
+
+    /// This cycle for the black box, but for the person, whom it has seen itself.
+    fn record(&self, now: Stamp, status: &MotionStatus) -> Record {
+        let (set, clearance, pair) = (self.motion.set(), self.guard.clearance(), &self.margin.pair);
+        Record {
+            now,
+            stop: self.stop.state(),
+            cause: self.stop.cause(),
+            mode: self.pace.mode(),
+            phase: status.phase.get().unwrap_or(MotionPhase::Idle),
+            task_id: self.job.task.id,
+            measured: [self.arm.position, self.arm.velocity],
+            commanded: [set.position, set.velocity, set.acceleration],
+            speed: status.speed,
+            clearance: clearance.distance,
+            clearance_pair: [clearance.link as u32, clearance.object],
+            separation: self.margin.pair.distance,
+            separation_required: self.margin.owed,
+            separation_pair: [pair.link as u32, pair.capsule as u32],
+            stopping_time: self.stopping_time,
+            human_age: self.watch.human_age(now),
+            ..Record::EMPTY
+        }
     }
 }

@@ -170,7 +170,9 @@ impl Controller {
 
     /// Sets out on a stretch, `swept` when it was found clear with the scene in force.
     pub(super) fn enter(&mut self, leg: &Leg, swept: bool, recovering: bool) -> bool {
-        let prepared = self.motion.follow(&leg.path, &leg.limits).and_then(|()| self.governor.take(&leg.limits));
+        let with_person = self.job.is_with_person();
+        let prepared =
+            self.motion.follow(&leg.path, &leg.limits).and_then(|()| self.governor.take(&leg.limits, with_person));
         self.guard.take(leg, self.job.attached(), swept);
         self.pace.take(&self.chain, leg, &self.job, &self.params, recovering);
         self.law_level = 0;
