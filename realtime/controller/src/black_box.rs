@@ -5,7 +5,11 @@
 //! time, and gives it back; while it is away, nothing further can be sealed, only recorded.
 //!
 //! Rings are boxes that change hands, so none of this copies or allocates in a cycle.
-#![allow(clippy::disallowed_types, reason = "the boxes are made at start; after that they only change hands")]
+#![allow(
+    clippy::disallowed_types,
+    clippy::disallowed_macros,
+    reason = "the boxes are made at start; after that they only change hands"
+)]
 
 use core::time::Duration;
 

@@ -64,8 +64,9 @@ impl Supervisor {
 /// Whether somebody stands nearer to a place than `within` metres on the level.
 fn is_beside(human: &HumanState, place: &Isometry3<f64>, within: f64) -> bool {
     let level = (Vector3::from(human.stand) - place.translation.vector).xy().norm();
-    // Written so that what is no number is near.
-    human.header.heard() && human.capsule_count > 0 && !(level >= within)
+    // What is no number is not far.
+    let far = level >= within;
+    human.header.heard() && human.capsule_count > 0 && !far
 }
 
 #[cfg(test)]

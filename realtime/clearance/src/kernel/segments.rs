@@ -114,6 +114,7 @@ fn share(x: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::disallowed_types, clippy::disallowed_macros, reason = "a test may allocate")]
 mod tests {
     use super::super::segment_to_segment;
     use super::*;
