@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use proptest::prelude::*;
-use tandem_clearance::{ArmBody, LinkCapsule, Monitor, Shapes};
+use tandem_clearance::{ArmBody, LinkCapsule, LinksToPeople, Monitor, Shapes};
 use tandem_cycle::guard::{CountingAllocator, counted};
-use tandem_kinematics::{Chain, Joint, JointKind, manipulability};
+use tandem_kinematics::{Chain, Joint, JointKind, LinkPoses, manipulability};
 use tandem_msg::{AttachedPart, Capsule, Code, Pose, SceneObject};
 
 #[global_allocator]
@@ -105,6 +105,19 @@ fn people() -> impl Strategy<Value = Vec<Capsule>> {
     prop::collection::vec(capsule, 0..6)
 }
 
+/// Of all links the nearest to a body part is as near as that part, or nearer where a hull counts as its capsule.
+fn links_agree(monitor: &Monitor, poses: &LinkPoses, exact: bool) {
+    let each = monitor.separations(poses);
+    let links = monitor.links_to_people(poses);
+    for (part, separation) in each.iter().enumerate().take(monitor.human_count()) {
+        let least =
+            |table: &LinksToPeople| table.iter().fold(f64::INFINITY, |least, row| row[part].distance.min(least));
+        let least = links.as_ref().map_or(f64::NEG_INFINITY, least);
+        assert!(least <= separation.distance + 1e-9, "{least} {}", separation.distance);
+        assert!(!exact || least >= separation.distance - 1e-9, "{least} {}", separation.distance);
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -141,6 +154,11 @@ proptest! {
             let each = monitor.separations(&poses);
             core::hint::black_box((lost, solved, clear, path));
             assert!(tracked == [clearance; 3]);
+            links_agree(&monitor, &poses, false);
+            let mut capsules = Monitor::new(body);
+            capsules.set_human(&people);
+            capsules.set_attached(Some(&part));
+            links_agree(&capsules, &poses, true);
             (clearance.distance, separation.distance, each[0].distance, clear)
         });
         prop_assert!(calls.is_none(), "{calls:?}");
