@@ -10,7 +10,8 @@ use tandem_config::Cell;
 
 /// A run in lockstep.
 pub(crate) struct Rig {
-    pub(crate) sim: SimCell,
+    /// Boxed: the roles are some hundred kilobytes each, and a test's stack is small.
+    pub(crate) sim: Box<SimCell>,
     store: Store,
     run: String,
     pub(crate) events: Vec<Event>,
@@ -48,7 +49,7 @@ impl Rig {
         store.begin(&record).expect("the run is recorded");
         let library = store.library().expect("the library is read");
         let options = RunOptions { boxes, seed, run_id: run.clone() };
-        let sim = SimCell::new(&cell, library, options).unwrap_or_else(|error| panic!("{error}"));
+        let sim = Box::new(SimCell::new(&cell, library, options).unwrap_or_else(|error| panic!("{error}")));
         Self { sim, store, run, events: Vec::new(), _folder: folder }
     }
 
