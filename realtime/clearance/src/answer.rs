@@ -1,7 +1,5 @@
 //! What the queries answer with.
 
-use crate::kernel::Near;
-
 /// The smallest distance between the arm, or what it carries, and what it must not touch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clearance {
