@@ -269,8 +269,9 @@ impl SimCell {
 /// # Errors
 /// Parameters it refuses.
 pub fn build_controller(cell: &Cell) -> Result<Controller, ParamsError> {
-    let controller = Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller)?;
-    Ok(controller.with_policies(cell.policies.clone()))
+    let mut controller = Controller::new(cell.robot.chain, cell.robot.monitor(), cell.controller)?;
+    controller.set_policies(cell.policies.clone());
+    Ok(controller)
 }
 
 fn identity(role: Role, epoch: u64, config_hash: u64) -> Identity {

@@ -16,8 +16,8 @@ fn an_unknown_key_is_named_with_its_place_and_the_one_that_was_meant() {
         "cells/s471.toml",
         "plant = { period_us = 1000",
         "plant = { period_ms = 1000",
-        "cells/s471.toml:18:9: timing.plant.period_us is missing, allowed 250..=1000000 us; add it\n\
-         cells/s471.toml:18:11: unknown key `timing.plant.period_ms`; did you mean `period_us`?\n",
+        "cells/s471.toml:19:9: timing.plant.period_us is missing, allowed 250..=1000000 us; add it\n\
+         cells/s471.toml:19:11: unknown key `timing.plant.period_ms`; did you mean `period_us`?\n",
     );
 }
 

@@ -43,8 +43,8 @@ fn towards(gain: f32, bias: f32) -> Stored {
 fn cell_with(policy: Stored) -> Cell {
     let mut cell = Cell::new();
     let policies = Policies { transfer: Some(policy), ..Policies::default() };
-    let controller = Controller::new(ur10(), Monitor::new(body()), params()).expect("the parameters pass");
-    cell.controller = controller.with_policies(policies);
+    cell.controller = Controller::new(ur10(), Monitor::new(body()), params()).expect("the parameters pass");
+    cell.controller.set_policies(policies);
     cell
 }
 

@@ -234,8 +234,9 @@ impl Fake {
             self.motion.stop = Code::of(StopState::Running);
             self.motion.cause = Code::of(StopCause::None);
         }
-        self.motion.standstill = u32::from(!task.run.is(RunMode::Run));
-        if !task.run.is(RunMode::Run) || !self.motion.stop.is(StopState::Running) {
+        let runs = task.run.is(RunMode::Run) || task.run.is(RunMode::Reduced);
+        self.motion.standstill = u32::from(!runs);
+        if !runs || !self.motion.stop.is(StopState::Running) {
             self.motion_since = self.motion_since.after(PERIOD);
             return;
         }

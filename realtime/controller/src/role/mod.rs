@@ -66,12 +66,13 @@ pub struct Controller {
     stop: StopMonitor,
     job: Job,
     effector: Effector,
-    search: Search,
-    planner: Monitor,
+    // What is large lies on the heap, since a controller is moved about until it runs.
+    search: Box<Search>,
+    planner: Box<Monitor>,
     policies: Policies,
     surroundings: Surroundings,
     motion: Motion,
-    guard: Guard,
+    guard: Box<Guard>,
     governor: Governor,
     /// Level the law in force was made for.
     law_level: usize,
@@ -115,12 +116,12 @@ impl Controller {
             stop: StopMonitor::new(params.resume_after_separation, params.separation.resume_delay),
             job: Job::none(),
             effector: Effector::default(),
-            search: Search::new(),
-            planner: arm.clone(),
+            search: Box::new(Search::new()),
+            planner: Box::new(arm.clone()),
             policies: Policies::default(),
             surroundings: Surroundings::default(),
             motion: Motion::new(&chain),
-            guard: Guard::new(&chain, arm, params.clearance_min),
+            guard: Box::new(Guard::new(&chain, arm, params.clearance_min)),
             governor: Governor::new(&params.separation),
             law_level: 0,
             pace: Pace::new(),
@@ -137,11 +138,12 @@ impl Controller {
         })
     }
 
-    /// The same controller with policies that are asked for the way across before anybody else; an arm that has not
-    /// the joints they move goes without.
-    #[must_use]
-    pub fn with_policies(self, policies: Policies) -> Self {
-        if self.chain.joint_count() == tandem_policy::DOF { Self { policies, ..self } } else { self }
+    /// Gives it policies that are asked for the way across before anybody else; an arm that has not the joints they
+    /// move goes without.
+    pub fn set_policies(&mut self, policies: Policies) {
+        if self.chain.joint_count() == tandem_policy::DOF {
+            self.policies = policies;
+        }
     }
 
     /// Runs one cycle: reads the latest inputs, writes the next command and the status.
