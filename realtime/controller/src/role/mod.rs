@@ -48,7 +48,8 @@ pub struct ControllerOutputs {
     pub status: MotionStatus,
 }
 
-/// The controller role. It never grows: some hundred kilobytes in place, and the trees of its sampling planner.
+/// The controller role. It never grows: some two hundred kilobytes, and the trees of its sampling planner.
+#[allow(clippy::disallowed_types, reason = "made at start")]
 pub struct Controller {
     chain: Chain,
     params: Params,
@@ -96,6 +97,7 @@ impl Controller {
     ///
     /// # Errors
     /// Every parameter that is out of range.
+    #[allow(clippy::disallowed_types, reason = "made at start")]
     pub fn new(chain: Chain, arm: impl Into<Monitor>, params: Params) -> Result<Self, ParamsError> {
         params.check()?;
         let arm = arm.into();
