@@ -19,9 +19,9 @@ const NANOS: u64 = 1_000_000_000;
 /// Left out at the beginning: caches are cold.
 pub(super) const WARM_UP: u64 = 20;
 
-/// What the measured threads ask for.
+/// What the measured threads ask for; of idle processors the same as cyclictest does.
 pub(super) fn wish(cpu: Option<u32>) -> Wish {
-    Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu, lock_memory: true, dma_latency_us: None }
+    Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu, lock_memory: true, dma_latency_us: Some(0) }
 }
 
 /// The processor the loops run on: the one asked for, or the last, which gets the fewest interrupts.
@@ -105,9 +105,13 @@ pub(super) fn fixed_rate(mut rate: FixedRate<Monotonic>, time: Duration, warm_up
     Kept { lateness, missed, tail: Duration::from_nanos(rate.record().spin_tail_ns) }
 }
 
+/// As the shipped cell's controller: off the whole milliseconds, at which the kernel's tick comes to a processor that
+/// is not idle, as one that spins is not.
+const PHASE: Duration = Duration::from_micros(200);
+
 /// A loop at that period, on the grid, that spins at most so long before each point.
 pub(super) fn rate(period: Duration, spin_max: Duration) -> FixedRate<Monotonic> {
-    let grid = Grid::new(period, Duration::ZERO).expect("a period a grid can have");
+    let grid = Grid::new(period, PHASE).expect("a period a grid can have");
     FixedRate::recording_in(SharedRecord::default(), grid, Monotonic, Pace { spin_max, ..Pace::default() })
 }
 
