@@ -19,9 +19,17 @@ const NANOS: u64 = 1_000_000_000;
 /// Left out at the beginning: caches are cold.
 pub(super) const WARM_UP: u64 = 20;
 
-/// What the measured threads ask for; of idle processors the same as cyclictest does.
+/// What the measured threads ask for.
 pub(super) fn wish(cpu: Option<u32>) -> Wish {
-    Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu, lock_memory: true, dma_latency_us: Some(0) }
+    Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu, lock_memory: true, dma_latency_us: None }
+}
+
+/// Has idle processors wake up at once while this process lives, as cyclictest does, so that all are measured alike;
+/// where that is not permitted, all do without.
+pub(super) fn keep_awake() {
+    let wish =
+        Wish { policy: Policy::BestEffort, priority: None, cpu: None, lock_memory: false, dma_latency_us: Some(0) };
+    let _ = acquire(&wish);
 }
 
 /// The processor the loops run on: the one asked for, or the last, which gets the fewest interrupts.

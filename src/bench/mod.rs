@@ -136,6 +136,7 @@ impl BenchError {
 /// A file is refused, or a process that is measured fails.
 pub fn run(bench: Bench, options: &Options) -> Result<Report, BenchError> {
     let mut report = Report::begin(bench);
+    loops::keep_awake();
     match bench {
         Bench::Jitter => jitter::run(options, &mut report)?,
         Bench::Latency => latency::run(options, &mut report)?,
