@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use rustix::process::{Resource, getrlimit};
 use rustix::time::{ClockId, clock_getres};
-use tandem_cycle::setup::{Granted, Policy, Wish, acquire};
+use tandem_cycle::setup::{Granted, acquire};
 
 use super::cell::{self, CellFound};
 use super::storage;
-use super::wake_up::{self, WakeUp};
+use super::wake_up::{self, WISH, WakeUp};
 use crate::live;
 
 /// The highest priority the shipped cell asks for.
@@ -106,14 +106,7 @@ fn free(mount: &Path) -> Option<u64> {
 
 /// Tried on a thread of its own, which takes the setting with it.
 fn granted() -> Option<Granted> {
-    let wish = Wish {
-        policy: Policy::BestEffort,
-        priority: Some(PRIORITY),
-        cpu: None,
-        lock_memory: false,
-        dma_latency_us: None,
-    };
-    std::thread::spawn(move || acquire(&wish).ok()).join().ok().flatten()
+    std::thread::spawn(|| acquire(&WISH).ok()).join().ok().flatten()
 }
 
 /// The word in brackets, as in `always [madvise] never`.

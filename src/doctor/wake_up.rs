@@ -13,6 +13,10 @@ const CYCLES: u32 = 300;
 /// Of a period of 1 ms: what is left must do for the work.
 const GOOD: Duration = Duration::from_micros(250);
 
+/// What the doctor tries to obtain: the priority of a loop, and nothing that would outlive the thread it is tried on.
+pub(super) const WISH: Wish =
+    Wish { policy: Policy::BestEffort, priority: Some(PRIORITY), cpu: None, lock_memory: false, dma_latency_us: None };
+
 /// What a short run of the loop found.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct WakeUp {
@@ -22,14 +26,7 @@ pub(super) struct WakeUp {
 }
 
 pub(super) fn trial() -> Option<WakeUp> {
-    let wish = Wish {
-        policy: Policy::BestEffort,
-        priority: Some(PRIORITY),
-        cpu: None,
-        lock_memory: false,
-        dma_latency_us: None,
-    };
-    acquire(&wish).ok()?;
+    acquire(&WISH).ok()?;
     let mut rate = FixedRate::new(Grid::new(PERIOD, Duration::ZERO).ok()?, Monotonic);
     for _ in 0..CYCLES {
         rate.wait();
