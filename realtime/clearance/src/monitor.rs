@@ -150,6 +150,17 @@ impl Monitor {
         self.nearest(&arm, f64::INFINITY, f64::NEG_INFINITY)
     }
 
+    /// The smallest distance to the scene alone: what the arm's shape always keeps it from itself hides nothing.
+    pub fn scene_clearance(&self, poses: &LinkPoses) -> Clearance {
+        let mut arm = self.unplaced(poses);
+        if !arm.place() || !self.is_sound() {
+            return Clearance::CONTACT;
+        }
+        let mut best = Clearance::NOTHING;
+        against(&arm, &self.scene, &self.touch, f64::NEG_INFINITY, &mut best);
+        best
+    }
+
     /// [`Monitor::clearance`] and [`Monitor::separation`] at once, which is quicker than one after the other.
     pub fn measure(&self, poses: &LinkPoses) -> (Clearance, Separation) {
         let mut arm = self.unplaced(poses);

@@ -138,10 +138,13 @@ fn depth_in_box(segment: &[Vector3<f64>; 2], half: &Vector3<f64>) -> (f64, Vecto
 /// Nearest points of two boxes, or `None` when they are farther apart than `enough`.
 ///
 /// Apart, two boxes are nearest at an edge of at least one of them, so the 24
-/// edges against the other box are all there is. Overlapping, the depth is the
+/// edges against the other box are all there is; and of those the ones that do not reach towards the other box as far as
+/// what was found already is near are ruled out. Overlapping, the depth is the
 /// smallest overlap over the 15 normals of the separating-axis test.
 pub(crate) fn box_to_box(first: &OrientedBox, second: &OrientedBox, enough: f64) -> Option<Near> {
-    let (gap, normal) = widest_gap(first, second);
+    let turn = first.axes.tr_mul(&second.axes);
+    let between = second.centre - first.centre;
+    let (gap, normal) = widest_gap(first, second, &turn, &between);
     if gap > enough {
         return None;
     }
@@ -152,64 +155,111 @@ pub(crate) fn box_to_box(first: &OrientedBox, second: &OrientedBox, enough: f64)
         return Some(Near { distance: gap, on_first, on_second: on_first + normal * gap });
     }
     let mut best = Near { distance: f64::INFINITY, on_first: Vector3::zeros(), on_second: Vector3::zeros() };
-    for edge in edges(first) {
-        let near = second.near_segment(&edge);
-        if near.distance < best.distance {
-            best = near;
-        }
+    // Edges of the first in the second's frame, then the other way round.
+    let at = second.axes.tr_mul(&-between);
+    if let Some(near) = near_edges(first, &normal, &turn.transpose(), &at, &second.half, gap, best.distance) {
+        best = near.mapped(|point| second.outwards(point));
     }
-    for edge in edges(second) {
-        let near = first.near_segment(&edge);
-        if near.distance < best.distance {
-            best = near.swapped();
-        }
+    let at = first.axes.tr_mul(&between);
+    if let Some(near) = near_edges(second, &-normal, &turn, &at, &first.half, gap, best.distance) {
+        best = near.mapped(|point| first.outwards(point)).swapped();
     }
     Some(best)
 }
 
-/// The largest gap over the 15 normals (negative: the smallest overlap), and its normal from
-/// the first box to the second. Never larger than the distance.
-fn widest_gap(first: &OrientedBox, second: &OrientedBox) -> (f64, Vector3<f64>) {
-    let between = second.centre - first.centre;
-    let mut widest = f64::NEG_INFINITY;
-    let mut way = Vector3::zeros();
-    let mut consider = |normal: Vector3<f64>| {
-        let reach =
-            first.axes.tr_mul(&normal).abs().dot(&first.half) + second.axes.tr_mul(&normal).abs().dot(&second.half);
-        let offset = between.dot(&normal);
-        let gap = offset.abs() - reach;
-        if gap > widest {
-            widest = gap;
-            way = if offset < 0.0 { -normal } else { normal };
-        }
-    };
-    for a in 0..3 {
-        consider(first.axes.column(a).into_owned());
-        consider(second.axes.column(a).into_owned());
-    }
-    for a in 0..3 {
-        for b in 0..3 {
-            let normal = first.axes.column(a).cross(&second.axes.column(b));
-            let length = normal.norm();
-            if length > 1e-6 {
-                consider(normal / length);
+/// Nearest points of the edges of a box (first) and another one (second), in the frame of that: `turn` and `at` are
+/// where the box stands in it, `half` its half extents. `None` where no edge is nearer than `limit`.
+///
+/// `way` points from the box to the other, base coordinates, and a plane across it parts them with `gap` to spare.
+fn near_edges(
+    of: &OrientedBox,
+    way: &Vector3<f64>,
+    turn: &Matrix3<f64>,
+    at: &Vector3<f64>,
+    half: &Vector3<f64>,
+    gap: f64,
+    limit: f64,
+) -> Option<Near> {
+    let reach = of.axes.tr_mul(way).component_mul(&of.half);
+    let corner = reach.zip_map(&of.half, |reach, half| half.copysign(reach));
+    let mut best: Option<Near> = None;
+    let mut limit = limit;
+    // Beginning with the edges at the corner that reaches farthest: an edge lies back from there, along
+    // the two axes across its own, by as much as it is on their other side.
+    for sides in [[false, false], [true, false], [false, true], [true, true]] {
+        for axis in 0..3 {
+            let across = [(axis + 1) % 3, (axis + 2) % 3];
+            let mut back = 0.0;
+            let mut middle = corner;
+            for (other, aside) in across.into_iter().zip(sides) {
+                if aside {
+                    back += 2.0 * reach[other].abs();
+                    middle[other] = -middle[other];
+                }
+            }
+            if gap + back > limit {
+                continue;
+            }
+            middle[axis] = 0.0;
+            let (centre, along) = (at + turn * middle, turn.column(axis) * of.half[axis]);
+            let near = segment_to_box(&[centre - along, centre + along], half);
+            if near.distance < limit {
+                limit = near.distance;
+                best = Some(near);
             }
         }
     }
-    (widest, way)
+    best
 }
 
-/// The twelve edges of a box, in base coordinates.
-fn edges(solid: &OrientedBox) -> [[Vector3<f64>; 2]; 12] {
-    core::array::from_fn(|index| {
-        let axis = index / 4;
-        let sign = |bit: usize| if index & bit == 0 { -1.0 } else { 1.0 };
-        let mut start = Vector3::zeros();
-        start[axis] = -solid.half[axis];
-        start[(axis + 1) % 3] = sign(1) * solid.half[(axis + 1) % 3];
-        start[(axis + 2) % 3] = sign(2) * solid.half[(axis + 2) % 3];
-        let mut end = start;
-        end[axis] = solid.half[axis];
-        [solid.outwards(start), solid.outwards(end)]
-    })
+/// The largest gap over the 15 normals (negative: the smallest overlap), and its normal from
+/// the first box to the second. Never larger than the distance. `turn`: first from second; `between`: their centres, in base
+/// coordinates.
+fn widest_gap(
+    first: &OrientedBox,
+    second: &OrientedBox,
+    turn: &Matrix3<f64>,
+    between: &Vector3<f64>,
+) -> (f64, Vector3<f64>) {
+    let (a_half, b_half) = (&first.half, &second.half);
+    let in_first = first.axes.tr_mul(between);
+    let in_second = turn.tr_mul(&in_first);
+    let size = turn.abs();
+    let a_reach = a_half + size * b_half;
+    let b_reach = b_half + size.tr_mul(a_half);
+    let mut widest = (f64::NEG_INFINITY, 0.0, 0, 0);
+    let mut consider = |offset: f64, reach: f64, a: usize, b: usize| {
+        let gap = offset.abs() - reach;
+        if gap > widest.0 {
+            widest = (gap, offset, a, b);
+        }
+    };
+    // Index 3: the normal is an axis of the other box alone.
+    for axis in 0..3 {
+        consider(in_first[axis], a_reach[axis], axis, 3);
+        consider(in_second[axis], b_reach[axis], 3, axis);
+    }
+    for a in 0..3 {
+        let (a1, a2) = ((a + 1) % 3, (a + 2) % 3);
+        for b in 0..3 {
+            // Of the cross product of the two axes.
+            let length = (turn[(a1, b)].powi(2) + turn[(a2, b)].powi(2)).sqrt();
+            if length > 1e-6 {
+                let (b1, b2) = ((b + 1) % 3, (b + 2) % 3);
+                let offset = in_first[a2] * turn[(a1, b)] - in_first[a1] * turn[(a2, b)];
+                let reach = a_half[a1] * size[(a2, b)]
+                    + a_half[a2] * size[(a1, b)]
+                    + b_half[b1] * size[(a, b2)]
+                    + b_half[b2] * size[(a, b1)];
+                consider(offset / length, reach / length, a, b);
+            }
+        }
+    }
+    let (gap, offset, a, b) = widest;
+    let normal = match (a, b) {
+        (a, 3) => first.axes.column(a).into_owned(),
+        (3, b) => second.axes.column(b).into_owned(),
+        (a, b) => first.axes.column(a).cross(&second.axes.column(b)).normalize(),
+    };
+    (gap, if offset < 0.0 { -normal } else { normal })
 }

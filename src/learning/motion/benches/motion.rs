@@ -1,6 +1,7 @@
 //! How fast is the environment stepped, and how long does an update take?
 //!
-//! `cargo bench -p tandem-motion`; the environment on as many threads as there are processors.
+//! `cargo bench -p tandem-motion`; the environment on as many threads as there are processors. Beside the rate of the
+//! wall clock stands the rate of the time the threads had a processor: on a machine that others use, that one holds.
 
 use std::path::Path;
 use std::time::Instant;
@@ -17,8 +18,15 @@ fn world(product: &str) -> World {
     World::new(Cell::load(&file, Some(product)).expect("the shipped cell"))
 }
 
-/// Steps a second of one thread, walking at random.
-fn steps(world: &World, scenes: &[Scene], count: usize, seed: u64) {
+/// Seconds this thread has had a processor; `None` where the kernel does not tell.
+fn processor_time() -> Option<f64> {
+    let told = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    Some(told.split_whitespace().next()?.parse::<f64>().ok()? * 1e-9)
+}
+
+/// Walks at random; seconds of a processor that took.
+fn steps(world: &World, scenes: &[Scene], count: usize, seed: u64) -> f64 {
+    let began = processor_time();
     let mut draws = ChaCha8Rng::seed_from_u64(seed);
     let mut environments: Vec<_> = scenes.iter().map(|scene| Environment::new(world, scene, Shield::On)).collect();
     for step in 0..count {
@@ -29,6 +37,7 @@ fn steps(world: &World, scenes: &[Scene], count: usize, seed: u64) {
             environment.reset(&scenes[index], &scenes[index].start, 0.0);
         }
     }
+    processor_time().zip(began).map_or(f64::NAN, |(ended, began)| ended - began)
 }
 
 fn main() {
@@ -44,16 +53,18 @@ fn main() {
         let each = began.elapsed().as_secs_f64() * 1e3 / scene_count as f64;
         let blocked = scenes.iter().filter(|scene| scene.straight_blocked).count();
         let began = Instant::now();
-        std::thread::scope(|scope| {
-            for thread in 0..threads {
-                let (world, scenes) = (&world, &scenes);
-                scope.spawn(move || steps(world, scenes, step_count, thread as u64));
-            }
+        let processor: f64 = std::thread::scope(|scope| {
+            let (world, scenes) = (&world, &scenes);
+            let walk = |thread| scope.spawn(move || steps(world, scenes, step_count, thread as u64));
+            let walks: Vec<_> = (0..threads).map(walk).collect();
+            walks.into_iter().map(|walk| walk.join().expect("a walk")).sum()
         });
-        let rate = (threads * step_count) as f64 / began.elapsed().as_secs_f64();
+        let all = (threads * step_count) as f64;
         println!(
-            "{:9} {rate:8.0} steps/s on {threads} threads; a scene in {each:.1} ms, straight line blocked in {blocked} of {scene_count}",
-            subtask.name()
+            "{:9} {:8.0} steps/s on {threads} threads, {:8.0} a second of one processor; a scene in {each:.1} ms, straight line blocked in {blocked} of {scene_count}",
+            subtask.name(),
+            all / began.elapsed().as_secs_f64(),
+            all / processor
         );
     }
     let mut replay = Replay::new(4_096);
@@ -70,10 +81,16 @@ fn main() {
     let plain = Agent::new(Lateral::Adapter, &mut draws);
     let progressive = plain.progressive(&mut draws);
     for (name, mut agent) in [("actor-critic", plain), ("progressive, 2 columns", progressive)] {
-        let began = Instant::now();
+        let (began, processor) = (Instant::now(), processor_time());
         for _ in 0..update_count {
             agent.update(&replay, &replay, &Tuning::default(), &mut draws);
         }
-        println!("{name}: {:.2} ms an update", began.elapsed().as_secs_f64() * 1e3 / f64::from(update_count));
+        let each = |seconds: f64| seconds * 1e3 / f64::from(update_count);
+        let processor = processor_time().zip(processor).map_or(f64::NAN, |(ended, began)| ended - began);
+        println!(
+            "{name}: {:.2} ms an update, {:.2} of a processor",
+            each(began.elapsed().as_secs_f64()),
+            each(processor)
+        );
     }
 }
