@@ -6,9 +6,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde_json::json;
-use tandem_config::{Cell, PolicyModel};
-use tandem_motion::{self as motion, Candidate, Method, Point, Row, Split, Subtask, World};
+use tandem_config::{Cell, PolicyCard, PolicyModel};
+use tandem_motion::{self as motion, Candidate, Extent, Method, Point, Row, Split, Subtask, World};
 
+use super::train::MethodName;
 use super::{check, exit};
 use crate::plot;
 
@@ -26,6 +27,12 @@ pub(super) struct PoliciesArgs {
     /// Twenty tests a subtask
     #[arg(long)]
     quick: bool,
+    /// Policies only, and only as the cell moves them: for very many tests; no page is written
+    #[arg(long)]
+    shielded: bool,
+    /// Policies of these methods only
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["ac", "pnn", "fine-tuned"])]
+    method: Vec<MethodName>,
     /// Seed of the tests
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -49,6 +56,9 @@ type Measure = (&'static str, fn(&Point) -> f64);
 /// Curves of a subtask: method, seed, points.
 type Curves = Vec<(Method, u64, Vec<Point>)>;
 
+/// How the policies of a method came to be: by which command, but for the subtask.
+type Trainings = BTreeMap<String, u64>;
+
 pub(super) fn policies(args: &PoliciesArgs) -> u8 {
     let world = match Cell::load(&args.cell, Some(&args.product)) {
         Ok(cell) => World::new(cell),
@@ -57,9 +67,9 @@ pub(super) fn policies(args: &PoliciesArgs) -> u8 {
     let tests = if args.quick { args.tests.min(20) } else { args.tests } as usize;
     let mut rows = Vec::new();
     let mut curves = BTreeMap::new();
-    let mut blocked = BTreeMap::new();
+    let (mut blocked, mut trainings) = (BTreeMap::new(), Trainings::new());
     for subtask in Subtask::ALL {
-        let (candidates, of_subtask) = match candidates(args, &world, subtask) {
+        let (candidates, of_subtask) = match candidates(args, &world, subtask, &mut trainings) {
             Ok(found) => found,
             Err(error) => {
                 anstream::eprintln!("{error}");
@@ -68,13 +78,25 @@ pub(super) fn policies(args: &PoliciesArgs) -> u8 {
         };
         let scenes = motion::scenes(&world, subtask, Split::Test, args.seed, tests);
         blocked.insert(subtask.name(), scenes.iter().filter(|scene| scene.straight_blocked).count());
-        for row in motion::evaluate(&world, subtask.name(), &scenes, &candidates) {
+        let extent = if args.shielded { Extent::ShieldedPolicies } else { Extent::All };
+        for row in motion::evaluate(&world, subtask.name(), &scenes, &candidates, extent) {
             print(&row, args.json);
             rows.push(row);
         }
         curves.insert(subtask.name(), of_subtask);
     }
-    match write(args, tests, &rows, &curves, &blocked) {
+    if args.shielded {
+        let contacts = pooled(rows.iter().map(|row| row.contact));
+        anstream::eprintln!(
+            "{} contacts in {} shielded motions of {} scenes: at most {:.4} % (95 %)",
+            contacts.count,
+            contacts.of,
+            Subtask::ALL.len() * tests,
+            1e2 * contacts.interval[1]
+        );
+        return exit::OK;
+    }
+    match write(args, tests, &rows, &curves, &blocked, &trainings) {
         Ok(()) => exit::OK,
         Err(error) => {
             anstream::eprintln!("{}: {error}; choose a writable folder with --out", args.out.display());
@@ -84,7 +106,12 @@ pub(super) fn policies(args: &PoliciesArgs) -> u8 {
 }
 
 /// The policies of a subtask, and how they came to be.
-fn candidates(args: &PoliciesArgs, world: &World, subtask: Subtask) -> std::io::Result<(Vec<Candidate>, Curves)> {
+fn candidates(
+    args: &PoliciesArgs,
+    world: &World,
+    subtask: Subtask,
+    trainings: &mut Trainings,
+) -> std::io::Result<(Vec<Candidate>, Curves)> {
     let product = &world.cell.product.name;
     let (mut candidates, mut curves) = (Vec::new(), Curves::new());
     let of = |model: PolicyModel| Candidate {
@@ -93,13 +120,20 @@ fn candidates(args: &PoliciesArgs, world: &World, subtask: Subtask) -> std::io::
         shape: model.shape,
         numbers: model.numbers,
     };
-    for method in [Method::Ac, Method::Pnn, Method::FineTuned] {
+    for (name, method) in args.method.iter().map(|name| (name, name.method())) {
         for seed in 1..=100 {
             let folder = motion::folder(&args.trained, product, subtask, method, seed);
             if !folder.join(motion::CURVE).exists() {
                 break;
             }
-            candidates.push(of(PolicyModel::load(&folder, subtask.name())?));
+            let model = PolicyModel::load(&folder, subtask.name())?;
+            let PolicyCard { product, scenes, updates, .. } = &model.card;
+            let method_name =
+                clap::ValueEnum::to_possible_value(name).map_or(String::new(), |name| name.get_name().into());
+            let command = format!("--product {product} --method {method_name} --scenes {scenes} --updates {updates}");
+            let runs = trainings.entry(command).or_default();
+            *runs = seed.max(*runs);
+            candidates.push(of(model));
             let curve = std::fs::read(folder.join(motion::CURVE))?;
             curves.push((method, seed, serde_json::from_slice(&curve)?));
         }
@@ -141,12 +175,13 @@ fn write(
     rows: &[Row],
     curves: &BTreeMap<&str, Curves>,
     blocked: &BTreeMap<&str, usize>,
+    trainings: &Trainings,
 ) -> std::io::Result<()> {
     std::fs::create_dir_all(&args.out)?;
     let report = json!({"product": args.product, "tests": tests, "seed": args.seed, "straight_line_blocked": blocked, "rows": rows, "curves": curves});
     std::fs::write(args.out.join("policies.json"), format!("{report:#}\n"))?;
     figure(curves).save(&args.out.join("policies.svg"))?;
-    std::fs::write(args.out.join("policies.md"), page(args, tests, rows, curves, blocked))
+    std::fs::write(args.out.join("policies.md"), page(args, tests, rows, curves, blocked, trainings))
 }
 
 /// Reward, success and loss over the episodes, a line a method: the median of its seeds.
@@ -163,9 +198,7 @@ fn figure(curves: &BTreeMap<&str, Curves>) -> plot::Figure {
                 let of: Vec<&Vec<Point>> = curves.iter().filter(|(m, ..)| *m == method).map(|(.., c)| c).collect();
                 let length = of.iter().map(|curve| curve.len()).min()?;
                 let middle = |index: usize, of_point: &dyn Fn(&Point) -> f64| {
-                    let mut values: Vec<f64> = of.iter().map(|curve| of_point(&curve[index])).collect();
-                    values.sort_unstable_by(f64::total_cmp);
-                    values[values.len() / 2]
+                    motion::median(of.iter().map(|curve| of_point(&curve[index])))
                 };
                 let points = (0..length)
                     .map(|index| [middle(index, &|point| point.episodes as f64), middle(index, &measure)])
@@ -196,6 +229,7 @@ fn page(
     rows: &[Row],
     curves: &BTreeMap<&str, Curves>,
     blocked: &BTreeMap<&str, usize>,
+    trainings: &Trainings,
 ) -> String {
     let mut page = String::from("# Learned motion, measured\n\n");
     let _ = writeln!(
@@ -207,45 +241,79 @@ fn page(
         args.seed,
         args.out.display()
     );
+    for (options, runs) in trainings {
+        let _ = writeln!(page, "    tandem train policy --subtask all {options} --runs {runs}");
+    }
+    if !trainings.is_empty() {
+        page.push_str("\nmade the policies, on the columns of the first product where they are built on.\n\n");
+    }
     let shares: Vec<String> = blocked
         .iter()
         .map(|(subtask, count)| format!("{subtask} {:.0} %", 1e2 * *count as f64 / tests as f64))
         .collect();
     let _ = writeln!(page, "Scenes whose straight joint line touches something: {}.\n", shares.join(", "));
-    page.push_str("| subtask | method | seed | | reached % (95 %) | contact % (95 %) | s | of manual | of planner |\n|---|---|---|---|---|---|---|---|---|\n");
-    for row in rows {
-        let percent = |rate: &motion::Rate| {
-            let [low, high] = rate.interval.map(|end| 1e2 * end);
-            format!("{:.1} ({low:.1}–{high:.1})", 1e2 * rate.rate)
+    page.push_str(
+        "Of a method with several seeds the rates are those of all their tests together, with the worst seed beside them, and the \
+         times are medians over the seeds; policies.json has every seed.\n\n\
+         | subtask | method | seeds | | reached % (95 %) | worst | contact % (95 %) | worst | s | of manual | of planner |\n\
+         |---|---|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for of_method in rows.chunk_by(|a, b| (&a.subtask, &a.method, a.shielded) == (&b.subtask, &b.method, b.shielded)) {
+        let rate = |of: fn(&Row) -> motion::Rate, worst: fn(f64, f64) -> f64| {
+            let all = pooled(of_method.iter().map(of));
+            let [low, high] = all.interval.map(|end| 1e2 * end);
+            let worst = of_method.iter().map(|row| of(row).rate).reduce(worst).unwrap_or(f64::NAN);
+            format!("{:.1} ({low:.1}–{high:.1}) | {:.1}", 1e2 * all.rate, 1e2 * worst)
         };
+        let time = |of: fn(&Row) -> f64| motion::median(of_method.iter().map(of));
+        let first = &of_method[0];
         let _ = writeln!(
             page,
             "| {} | {} | {} | {} | {} | {} | {:.2} | {:.2} | {:.2} |",
-            row.subtask,
-            row.method,
-            row.seed,
-            if row.shielded { "shielded" } else { "alone" },
-            percent(&row.reached),
-            percent(&row.contact),
-            row.time_s,
-            row.time_over_manual,
-            row.time_over_planner
+            first.subtask,
+            first.method,
+            if first.seed == 0 { "–".into() } else { of_method.len().to_string() },
+            if first.shielded { "shielded" } else { "alone" },
+            rate(|row| row.reached, f64::min),
+            rate(|row| row.contact, f64::max),
+            time(|row| row.time_s),
+            time(|row| row.time_over_manual),
+            time(|row| row.time_over_planner)
         );
     }
-    page.push_str("\n![curves](policies.svg)\n\n## Episodes to a common level of success\n\nFrom which episode on the curve of every seed stays at or above the level; validation scenes, nothing refused.\n\n| subtask | level | method | each seed |\n|---|---|---|---|\n");
+    page.push_str("\n![curves](policies.svg)\n\n## Episodes to a common level of success\n\nFrom which episode on the curve of every seed stays at or above the level; validation scenes, nothing refused. The ratio is that of the medians, to the actor-critic without earlier columns.\n\n| subtask | level | method | each seed | median | ratio |\n|---|---|---|---|---|---|\n");
     for (subtask, curves) in curves {
-        for level in [0.7, 0.8, 0.85, 0.9] {
+        for level in [0.7, 0.8, 0.85, 0.9, 0.95] {
+            let episodes = |method: Method| -> Vec<Option<u64>> {
+                curves.iter().filter(|(m, ..)| *m == method).map(|(.., curve)| reaches(curve, level)).collect()
+            };
+            // A seed that never came there counts as later than all others.
+            let middle =
+                |of: &[Option<u64>]| motion::median(of.iter().map(|at| at.map_or(f64::INFINITY, |at| at as f64)));
+            let alone = middle(&episodes(Method::Ac));
             for method in [Method::Ac, Method::Pnn, Method::FineTuned] {
-                let each: Vec<String> = curves
-                    .iter()
-                    .filter(|(m, ..)| *m == method)
-                    .map(|(.., curve)| reaches(curve, level).map_or("not".into(), |episode| episode.to_string()))
-                    .collect();
-                if !each.is_empty() {
-                    let _ = writeln!(page, "| {subtask} | {level} | {} | {} |", method.name(), each.join(", "));
+                let of_method = episodes(method);
+                if of_method.is_empty() {
+                    continue;
                 }
+                let named = |at: &Option<u64>| at.map_or("not".into(), |at| at.to_string());
+                let each: Vec<String> = of_method.iter().map(named).collect();
+                let (each, name, middle) = (each.join(", "), method.name(), middle(&of_method));
+                let ratio = if middle.is_finite() && alone.is_finite() {
+                    format!("{:.2}", middle / alone)
+                } else {
+                    "–".into()
+                };
+                let middle = if middle.is_finite() { format!("{middle:.0}") } else { "not".into() };
+                let _ = writeln!(page, "| {subtask} | {level} | {name} | {each} | {middle} | {ratio} |");
             }
         }
     }
     page
+}
+
+/// The rate of all tests together.
+fn pooled(rates: impl Iterator<Item = motion::Rate>) -> motion::Rate {
+    let (count, of) = rates.fold((0, 0), |(count, of), rate| (count + rate.count, of + rate.of));
+    motion::Rate::new(count, of)
 }

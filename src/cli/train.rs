@@ -42,13 +42,23 @@ enum SubtaskName {
 }
 
 #[derive(Clone, Copy, clap::ValueEnum)]
-enum MethodName {
+pub(super) enum MethodName {
     /// Actor-critic of one column, from nothing
     Ac,
     /// A new column beside the frozen ones of the source product
     Pnn,
     /// The source product's column itself, trained on
     FineTuned,
+}
+
+impl MethodName {
+    pub(super) fn method(self) -> motion::Method {
+        match self {
+            Self::Ac => motion::Method::Ac,
+            Self::Pnn => motion::Method::Pnn,
+            Self::FineTuned => motion::Method::FineTuned,
+        }
+    }
 }
 
 #[derive(Args)]
@@ -72,10 +82,10 @@ struct PolicyArgs {
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// Updates of each training
-    #[arg(long, default_value_t = 2_500, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
+    #[arg(long, default_value_t = 2_000, value_parser = clap::value_parser!(u64).range(1..=10_000_000))]
     updates: u64,
     /// Scenes to train in
-    #[arg(long, default_value_t = 500, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    #[arg(long, default_value_t = 2_000, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     scenes: u32,
     /// Product whose columns are built on
     #[arg(long, default_value = "s471")]
@@ -152,12 +162,7 @@ fn policy(args: &PolicyArgs) -> u8 {
         SubtaskName::Assemble => vec![motion::Subtask::Assemble],
         SubtaskName::All => motion::Subtask::ALL.to_vec(),
     };
-    let methods = args.method.iter().map(|method| match method {
-        MethodName::Ac => motion::Method::Ac,
-        MethodName::Pnn => motion::Method::Pnn,
-        MethodName::FineTuned => motion::Method::FineTuned,
-    });
-    let methods: Vec<_> = methods.collect();
+    let methods: Vec<_> = args.method.iter().map(|method| method.method()).collect();
     for subtask in subtasks {
         let course = motion::Course {
             subtask,

@@ -32,7 +32,9 @@ mod shape;
 mod stored;
 mod tanh;
 
-pub use observe::{DOF, Destination, FAR, OBSERVATION, OBSTACLES, Observation, SCALE, Surroundings, observe};
+pub use observe::{
+    DOF, Destination, FAR, OBSERVATION, OBSTACLES, Observation, SAFETY, SCALE, Surroundings, observe, slopes,
+};
 pub use policy::{Activations, NotFinite, Policy};
 pub use rollout::{CAPTURE, REFUSED_MAX, Rollout, STEP, STEPS_MAX};
 pub use shape::{Lateral, Shape, ShapeError};

@@ -2,7 +2,8 @@
 //!
 //! The paper's state, `(D, D_o, S_r)`, stands first. It says neither where the goal lies nor how the arm
 //! stands, so joint positions and vectors follow: to the joint position at the goal, to the goal, to the obstacles,
-//! to what is nearest to the arm. Units are metres and radians; [`SCALE`] brings each to about one.
+//! to what of the scene is nearest to the arm, and how that clearance grows with each joint. Units are metres and
+//! radians; [`SCALE`] brings each to about one.
 
 use nalgebra::{Matrix3, Vector3};
 use tandem_clearance::{Clearance, Monitor};
@@ -19,16 +20,18 @@ pub const FAR: f64 = 0.5;
 const ALONG: usize = 5;
 
 const DISTANCES: usize = 1 + OBSTACLES + 1 + 1;
+/// Where S_r stands in an observation.
+pub const SAFETY: usize = DISTANCES - 1;
 const ARM: usize = 2 * DOF + 2 * 3;
 const SEEN: usize = OBSTACLES * 6;
-const NEAREST: usize = 1 + 3 + 3 + 1;
+const NEAREST: usize = 1 + 3 + 3 + 1 + DOF;
 const PERSON: usize = 3 + 3;
 const PART: usize = 3;
 /// Places on the straight joint line to the goal that are looked at ahead, as shares of it.
 const AHEAD: [f64; 3] = [0.25, 0.5, 0.75];
 /// How far ahead on that line the clearance is looked at, rad of the joint that turns most.
-const NEXT: f64 = 0.25;
-const LOOK: usize = AHEAD.len() * 4 + 1 + 3;
+const NEXT: [f64; 2] = [0.25, 0.7];
+const LOOK: usize = AHEAD.len() * 4 + NEXT.len() * (1 + 3 + DOF);
 /// Numbers of an observation.
 pub const OBSERVATION: usize = DISTANCES + ARM + SEEN + NEAREST + PERSON + PART + LOOK;
 
@@ -235,7 +238,7 @@ impl Writer<'_> {
 /// `safety` is S_r: 1 while all is free, -1 after a motion that was refused.
 ///
 /// # Realtime
-/// A clearance query, four forward solutions, and what is bounded by the objects of a scene; no allocation.
+/// Two clearance queries, five forward solutions, and what is bounded by the objects of a scene; no allocation.
 #[allow(clippy::too_many_arguments, reason = "all that there is to see")]
 pub fn observe(
     chain: &Chain,
@@ -295,6 +298,7 @@ pub fn observe(
     out.vector(&if sound { cut(&away) } else { Vector3::repeat(FAR) });
     out.vector(&if sound { on_arm - tcp } else { Vector3::zeros() });
     out.put(clearance.link as f64 / DOF as f64);
+    slopes(chain, poses, clearance).into_iter().for_each(|slope| out.put(slope));
     match person {
         Some((_, point, velocity)) => {
             out.vector(&cut(&(point - tcp)));
@@ -317,11 +321,30 @@ pub fn observe(
         out.put(near.fold(FAR, f64::min));
     }
     let turn = joints.iter().zip(&destination.joints).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-    let next = monitor.clearance(&chain.forward(&on_line((NEXT / turn.max(NEXT)).min(1.0))));
-    let sound = next.distance.is_finite();
-    out.put(if sound { next.distance.clamp(-0.1, FAR) } else { FAR });
-    out.vector(&if sound { cut(&(Vector3::from(next.point_on_other) - tcp)) } else { Vector3::repeat(FAR) });
+    for ahead in NEXT {
+        let poses = chain.forward(&on_line((ahead / turn.max(ahead)).min(1.0)));
+        let next = monitor.scene_clearance(&poses);
+        let sound = next.distance.is_finite();
+        out.put(if sound { next.distance.clamp(-0.1, FAR) } else { FAR });
+        out.vector(&if sound { cut(&(Vector3::from(next.point_on_other) - tcp)) } else { Vector3::repeat(FAR) });
+        slopes(chain, &poses, &next).into_iter().for_each(|slope| out.put(slope));
+    }
     Observation { numbers, distance, obstacles }
+}
+
+/// How the clearance grows with each joint, metres a rad; nothing where nothing is near.
+pub fn slopes(chain: &Chain, poses: &LinkPoses, clearance: &Clearance) -> [f64; DOF] {
+    let [on_arm, on_other] = [clearance.point_on_arm, clearance.point_on_other].map(Vector3::from);
+    // Overlapping, the points have changed sides.
+    let away = (on_arm - on_other) * clearance.distance.signum();
+    let mut slopes = [0.0; DOF];
+    let Some(away) = away.try_normalize(1e-9).filter(|_| clearance.distance < FAR) else { return slopes };
+    for (index, (slope, joint)) in slopes.iter_mut().zip(chain.joints()).enumerate().take(clearance.link) {
+        let pose = &poses.base_from_link[index + 1];
+        let axis = pose.rotation * joint.axis.into_inner();
+        *slope = away.dot(&axis.cross(&(on_arm - pose.translation.vector)));
+    }
+    slopes
 }
 
 /// Each coordinate cut at a metre: what is farther away counts as that far.

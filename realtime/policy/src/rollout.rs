@@ -5,10 +5,10 @@
 
 #![allow(clippy::neg_cmp_op_on_partial_ord, reason = "`!(a > b)` is meant: what is no number fails the check")]
 
-use tandem_clearance::{Clearance, Monitor};
+use tandem_clearance::{Clearance, Monitor, MotionSweep, Swept};
 use tandem_kinematics::{Chain, JOINTS_MAX, LinkPoses};
 
-use crate::observe::{DOF, Destination, Observation, Surroundings, observe};
+use crate::observe::{DOF, Destination, Observation, Surroundings, observe, slopes};
 
 /// Largest increment of a joint in a step, rad.
 pub const STEP: f32 = 0.12;
@@ -17,15 +17,20 @@ pub const STEPS_MAX: usize = 60;
 /// Within this of the goal in every joint the straight rest of the way is the controller's, rad.
 pub const CAPTURE: f64 = 0.25;
 /// Motions in a row that may be refused.
-pub const REFUSED_MAX: u32 = 4;
-/// Looks along one step: a step moves the arm by a few hand's breadths at most.
-const LOOKS: usize = 3;
+pub const REFUSED_MAX: u32 = 8;
+/// Looks along one step, after which it is refused: a step moves the arm by a few hand's breadths at most.
+const LOOKS: usize = 64;
+/// What a motion that was refused is led off by, metres for each time.
+const LED_OFF: f64 = 0.02;
+/// A step that keeps this much more than the margin is not refused, metres.
+const RESOLUTION: f64 = 0.002;
 
 /// Where a rollout stands.
 #[derive(Clone, Debug)]
 pub struct Rollout {
     joints: [f64; JOINTS_MAX],
     poses: LinkPoses,
+    /// Of the scene.
     clearance: Clearance,
     /// S_r.
     safety: f64,
@@ -37,7 +42,7 @@ impl Rollout {
     /// Begins at a joint position.
     pub fn begin(chain: &Chain, monitor: &Monitor, joints: &[f64; JOINTS_MAX]) -> Self {
         let poses = chain.forward(joints);
-        let clearance = monitor.clearance(&poses);
+        let clearance = monitor.scene_clearance(&poses);
         Self { joints: *joints, poses, clearance, safety: 1.0, refused: 0, steps: 0 }
     }
 
@@ -56,38 +61,70 @@ impl Rollout {
     ///
     /// Eq. (13) scores contact with 1 and freedom with -1, which in Eq. (15) rewards contact. Here S_r = 1 is
     /// free and -1 is contact; and contact is never made: the motion is refused, as a protective stop
-    /// would, and the episode goes on. (Episodes that end at contact were learned to be ended.)
+    /// would, and the episode goes on; asked for again, the motion is shorter and led off what it met. (Episodes that end at
+    /// contact were learned to be ended.)
     ///
     /// # Realtime
-    /// At most [`LOOKS`] clearance queries and one forward solution each; no allocation.
+    /// A clearance query, at most [`LOOKS`] looks of a sweep and one forward solution each; no allocation.
     pub fn advance(&mut self, chain: &Chain, monitor: &Monitor, action: &[f32; DOF], margin: f64) -> bool {
         self.steps += 1;
         // Eq. (14): six joint angles, here as bounded increments that are added up: an absolute angle would
         // make a motion of one step.
         let mut to = self.joints;
+        // Asked for again after a refusal, a motion is made shorter.
+        let share = 1.0 / (1.0 + 0.5 * f64::from(self.refused));
         for ((to, by), joint) in to.iter_mut().zip(action).zip(chain.joints()) {
-            *to = (*to + f64::from(*by)).clamp(joint.position_min, joint.position_max);
+            *to = (*to + share * f64::from(*by)).clamp(joint.position_min, joint.position_max);
         }
-        for look in 1..LOOKS {
-            let share = look as f64 / LOOKS as f64;
-            let between = core::array::from_fn(|k| self.joints[k] + share * (to[k] - self.joints[k]));
-            if !monitor.is_clear(&chain.forward(&between), margin) {
-                return self.refuse();
-            }
+        let mut poses = chain.forward(&to);
+        let mut clearance = monitor.scene_clearance(&poses);
+        if self.refused > 0 && clearance.distance.is_finite() {
+            self.lead_off(chain, &poses, &clearance, margin, &mut to);
+            poses = chain.forward(&to);
+            clearance = monitor.scene_clearance(&poses);
         }
-        let poses = chain.forward(&to);
-        let clearance = monitor.clearance(&poses);
-        if !(clearance.distance > margin) {
+        if !(clearance.distance > margin) || !self.sweeps_clear(chain, monitor, &to, margin) {
             return self.refuse();
         }
         self.place(&to, poses, clearance);
         true
     }
 
+    /// A motion that was refused and is asked for again is led off what it came too near to, the way the
+    /// clearance grows fastest, and the farther the oftener it was refused.
+    fn lead_off(
+        &self,
+        chain: &Chain,
+        poses: &LinkPoses,
+        clearance: &Clearance,
+        margin: f64,
+        to: &mut [f64; JOINTS_MAX],
+    ) {
+        let slopes = slopes(chain, poses, clearance);
+        let steepness: f64 = slopes.iter().map(|slope| slope * slope).sum();
+        let lacks = margin + LED_OFF * f64::from(self.refused) - clearance.distance;
+        if !(steepness > 1e-3 && lacks > 0.0) {
+            return;
+        }
+        let joints = chain.joints().iter().zip(&self.joints);
+        for ((to, slope), (joint, from)) in to.iter_mut().zip(&slopes).zip(joints) {
+            let most = f64::from(STEP);
+            *to = (*to + slope * lacks / steepness).clamp(from - most, from + most);
+            *to = to.clamp(joint.position_min, joint.position_max);
+        }
+    }
+
+    /// Whether the straight motion to `to` keeps `margin`: between looks as well.
+    fn sweeps_clear(&self, chain: &Chain, monitor: &Monitor, to: &[f64; JOINTS_MAX], margin: f64) -> bool {
+        let mut sweep = MotionSweep::new();
+        sweep.begin(monitor, &self.joints, to, margin, RESOLUTION);
+        (0..LOOKS).map(|_| sweep.look(chain, monitor)).find(|swept| *swept != Swept::More) == Some(Swept::Clear)
+    }
+
     /// Stands at a joint position, whatever is there.
     pub fn jump(&mut self, chain: &Chain, monitor: &Monitor, to: &[f64; JOINTS_MAX]) {
         let poses = chain.forward(to);
-        let clearance = monitor.clearance(&poses);
+        let clearance = monitor.scene_clearance(&poses);
         self.place(to, poses, clearance);
     }
 
@@ -115,11 +152,6 @@ impl Rollout {
     /// Where it stands, rad.
     pub fn joints(&self) -> &[f64; JOINTS_MAX] {
         &self.joints
-    }
-
-    /// Clearance there.
-    pub fn clearance(&self) -> &Clearance {
-        &self.clearance
     }
 
     /// The links there.

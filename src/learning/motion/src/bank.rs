@@ -3,6 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tandem_planner::Planner;
+use tandem_policy::{SAFETY, SCALE};
 
 use crate::agent::DISCOUNT;
 use crate::environment::{Environment, INPUTS, Shield};
@@ -46,10 +47,14 @@ pub fn scenes(world: &World, subtask: Subtask, split: Split, seed: u64, count: u
     slots.into_iter().flatten().collect()
 }
 
+/// As many threads as there are processors.
+pub(crate) fn threads() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get)
+}
+
 /// Does something to every item, on all processors; what comes out does not depend on how many there are.
-fn in_parallel<T: Send>(items: &mut [T], work: impl Fn(usize, &mut T, &mut Planner) + Sync) {
-    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZeroUsize::get);
-    let each = items.len().div_ceil(threads).max(1);
+pub(crate) fn in_parallel<T: Send>(items: &mut [T], work: impl Fn(usize, &mut T, &mut Planner) + Sync) {
+    let each = items.len().div_ceil(threads()).max(1);
     std::thread::scope(|scope| {
         for (chunk, items) in items.chunks_mut(each).enumerate() {
             let work = &work;
@@ -64,32 +69,42 @@ fn in_parallel<T: Send>(items: &mut [T], work: impl Fn(usize, &mut T, &mut Plann
 }
 
 /// Follows the planner's way from a joint position and keeps every step. Whether it came to the goal.
+///
+/// `refused`: a motion of the learner's was refused there, so the first step is shown as well for when it is told so.
 pub(crate) fn demonstrate(
     environment: &mut Environment<'_>,
     scene: &Scene,
     way: &[Joints],
     time: f64,
+    refused: bool,
     into: &mut Replay,
 ) -> bool {
+    /// How often: it is one step among many that nothing was refused before.
+    const TOLD: usize = 2;
     environment.shield = Shield::On;
     environment.reset(scene, &way[0], time);
-    let (mut at, mut share) = (0.0, 1.0);
+    let (mut at, mut told) = (0.0, if refused { TOLD } else { 0 });
     loop {
         let mut state = [0.0; INPUTS];
         environment.write_input(&mut state);
         let begun = at;
-        let action = expert::action(way, environment.joints(), &mut at, share);
+        let action = expert::action(way, environment.joints(), &mut at, 1.0);
         let stepped = environment.step(&action);
         if stepped.refused {
-            // A step that cuts a corner too short: shorter ones keep to the way.
-            if share < 0.3 || stepped.over {
+            // A step that cuts a corner too short; asked for anew it is shorter.
+            if stepped.over {
                 return false;
             }
-            (at, share) = (begun, 0.5 * share);
+            at = begun;
             continue;
         }
-        share = 1.0;
-        into.push(transition(state, action, environment, stepped.reward, stepped.arrived));
+        let step = transition(state, action, environment, stepped.reward, stepped.arrived);
+        for _ in 0..std::mem::take(&mut told) {
+            let mut step = step.clone();
+            step.state[SAFETY] = -SCALE[SAFETY];
+            into.push(step);
+        }
+        into.push(step);
         if stepped.over {
             return stepped.arrived;
         }
@@ -122,7 +137,7 @@ pub fn demonstrations(world: &World, subtask: Subtask, scenes: &[Scene]) -> Repl
         let scene = &scenes[index];
         let mut draws = draws(product, subtask, "demonstrations", index as u64);
         let mut environment = Environment::new(world, scene, Shield::On);
-        demonstrate(&mut environment, scene, &scene.way, 0.0, replay);
+        demonstrate(&mut environment, scene, &scene.way, 0.0, false, replay);
         for _ in 0..WAYS {
             let corner = draws.random_range(0..scene.way.len() - 1);
             let share: f64 = draws.random();
@@ -133,7 +148,7 @@ pub fn demonstrations(world: &World, subtask: Subtask, scenes: &[Scene]) -> Repl
             }
             let time = draws.random_range(0.0..3.0);
             if let Some(way) = expert::way(world, scene, &beside, time, planner, draws.random()) {
-                demonstrate(&mut environment, scene, &way, time, replay);
+                demonstrate(&mut environment, scene, &way, time, false, replay);
             }
         }
     });

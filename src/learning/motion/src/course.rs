@@ -125,7 +125,7 @@ fn one(
         method,
         seed,
         updates: course.updates,
-        interval: (course.updates / 10).max(1),
+        interval: (course.updates / 20).max(1),
         tuning: course.tuning,
         checkpoint: Some(into.join(CHECKPOINT)),
         resume: course.resume,

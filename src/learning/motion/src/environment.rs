@@ -3,7 +3,6 @@
 #![allow(clippy::neg_cmp_op_on_partial_ord, reason = "`!(a > b)` is meant: what is no number fails the check")]
 
 use tandem_clearance::Monitor;
-use tandem_kinematics::{Chain, JOINTS_MAX};
 use tandem_msg::{SCENE_OBJECTS_MAX, SceneObject};
 use tandem_policy::{DOF, Destination, OBSERVATION, Observation, Rollout, SCALE, STEP, Surroundings};
 
@@ -56,8 +55,6 @@ pub struct Environment<'w> {
     rollout: Rollout,
     observation: Observation,
     time: f64,
-    /// Travel of the farthest point of arm and load per joint movement, metres per rad.
-    levers: Joints,
     /// Whether motions that are not clear are refused.
     pub shield: Shield,
 }
@@ -80,7 +77,6 @@ impl<'w> Environment<'w> {
             rollout,
             observation,
             time: 0.0,
-            levers: levers(world.chain()),
             shield,
         };
         environment.reset(scene, &scene.start, 0.0);
@@ -163,7 +159,6 @@ impl<'w> Environment<'w> {
         self.survey(false);
         let increments = action.map(|share| share.clamp(-1.0, 1.0) * STEP);
         let from = *self.rollout.joints();
-        let before = self.rollout.clearance().distance;
         let moved = self.rollout.advance(chain, &self.monitor, &increments, MARGIN);
         let mut contact = false;
         if !moved && self.shield == Shield::Off {
@@ -173,8 +168,6 @@ impl<'w> Environment<'w> {
             }
             contact = !self.monitor.path_is_clear(chain, &from, &to, 0.0, 1e-4);
             self.rollout.jump(chain, &self.monitor, &to);
-        } else if moved {
-            contact = self.touches(&from, before);
         }
         self.observation =
             self.rollout.observe(self.world.chain(), &self.monitor, &self.surroundings, &self.destination);
@@ -190,29 +183,6 @@ impl<'w> Environment<'w> {
             contact,
         }
     }
-
-    /// Whether a step that was looked at here and there touched something in between.
-    fn touches(&self, from: &Joints, before: f64) -> bool {
-        let chain = self.world.chain();
-        let to = self.rollout.joints();
-        let travel: f64 = from.iter().zip(to).zip(&self.levers).map(|((a, b), lever)| lever * (a - b).abs()).sum();
-        // Halfway, what was this far off at both ends is at least that far off.
-        let least = 0.5 * (before + self.rollout.clearance().distance - travel);
-        !(least > 0.0) && !self.monitor.path_is_clear(chain, from, to, 0.0, 1e-4)
-    }
-}
-
-/// Farthest that any point of arm and load can stand from each axis, metres.
-fn levers(chain: &Chain) -> Joints {
-    /// Half the diagonal of the largest part.
-    const LOAD: f64 = 0.30;
-    let mut levers = [0.0; JOINTS_MAX];
-    let mut beyond = chain.tool().translation.vector.norm() + LOAD;
-    for (lever, joint) in levers.iter_mut().zip(chain.joints()).take(DOF).rev() {
-        *lever = beyond;
-        beyond += joint.parent_from_joint.translation.vector.norm();
-    }
-    levers
 }
 
 /// The reward of a state.

@@ -1,18 +1,21 @@
 //! Fig. 10 on our data: collision rate and running time of hand-made, learned and planned paths.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use tandem_planner::Planner;
 use tandem_policy::{Activations, DOF, OBSERVATION, Policy, SCALE, STEP, Shape};
 
-use crate::bank::NODES;
+use crate::bank::{in_parallel, threads};
 use crate::baselines::{follow, manual, planned, shortened};
 use crate::environment::Shield;
 use crate::network::Pass;
 use crate::rollouts::{Outcome, rollouts};
 use crate::timing::duration;
-use crate::world::{Scene, World};
+use crate::world::{Joints, Scene, World};
 
 /// A rate with its 95 % interval after Wilson (1927).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -97,64 +100,122 @@ pub fn move_by(world: &World, scenes: &[Scene], shield: Shield, candidate: &Cand
     })
 }
 
-/// All methods on the scenes of one subtask.
-pub fn evaluate(world: &World, subtask: &str, scenes: &[Scene], candidates: &[Candidate]) -> Vec<Row> {
-    let chain = world.chain();
-    let mut planner = Planner::new(NODES);
-    let mut draws = ChaCha8Rng::seed_from_u64(1);
-    let by_hand: Vec<_> = scenes.iter().map(|scene| manual(world, scene)).collect();
-    let manual_s: Vec<_> = by_hand.iter().map(|path| duration(chain, path, true)).collect();
-    let ways: Vec<_> = scenes.iter().map(|scene| planned(world, scene, &mut planner, draws.random())).collect();
-    let planner_s: Vec<_> = ways.iter().map(|way| way.as_deref().and_then(|way| duration(chain, way, false))).collect();
-    let mut rows = Vec::new();
-    for shield in [Shield::Off, Shield::On] {
-        let mut add = |method: &str, seed: u64, outcomes: &[Outcome], seconds: &[Option<f64>]| {
-            let good = |outcome: &Outcome| outcome.arrived && !outcome.contact;
-            let timed: Vec<_> = (0..outcomes.len()).filter(|k| good(&outcomes[*k])).collect();
-            let ratio = |to: &[Option<f64>]| median(timed.iter().filter_map(|k| Some(seconds[*k]? / to[*k]?)));
-            rows.push(Row {
-                subtask: subtask.into(),
-                method: method.into(),
-                seed,
-                shielded: shield == Shield::On,
-                reached: Rate::new(timed.len(), outcomes.len()),
-                contact: Rate::new(outcomes.iter().filter(|outcome| outcome.contact).count(), outcomes.len()),
-                time_s: median(timed.iter().filter_map(|k| seconds[*k])),
-                time_over_manual: ratio(&manual_s),
-                time_over_planner: ratio(&planner_s),
-            });
-        };
-        let outcomes: Vec<_> =
-            scenes.iter().zip(&by_hand).map(|(scene, path)| follow(world, scene, path, shield)).collect();
-        add("manual", 0, &outcomes, &manual_s);
-        let outcomes: Vec<_> = scenes
-            .iter()
-            .zip(&ways)
-            .map(|(scene, way)| way.as_ref().map_or_else(Outcome::default, |way| follow(world, scene, way, shield)))
-            .collect();
-        add("planner", 0, &outcomes, &planner_s);
-        for candidate in candidates {
-            let outcomes = move_by(world, scenes, shield, candidate);
-            let seconds: Vec<_> = scenes
-                .iter()
-                .zip(&outcomes)
-                .map(|(scene, outcome)| {
-                    let path = match shield {
-                        Shield::Off => outcome.path.clone(),
-                        // In the cell a preview is shortened where the straight way is clear as well.
-                        Shield::On => shortened(world, &world.monitor_of(scene, 0.0, 0.0), &outcome.path),
-                    };
-                    duration(chain, &path, false)
-                })
-                .collect();
-            add(&candidate.method, candidate.seed, &outcomes, &seconds);
-        }
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Every method, alone and shielded, and times beside the hand-made and the planned path of the same scene.
+    All,
+    /// Policies alone in being measured, and only as the cell moves them: for very many tests. No times.
+    ShieldedPolicies,
+}
+
+/// The methods on the scenes of one subtask, on all processors; what comes out does not depend on how many there are.
+pub fn evaluate(world: &World, subtask: &str, scenes: &[Scene], candidates: &[Candidate], extent: Extent) -> Vec<Row> {
+    let mut paths: Vec<Paths> = Vec::new();
+    if extent == Extent::All {
+        let mut draws = ChaCha8Rng::seed_from_u64(1);
+        let begin = |scene| (scene, draws.random::<u64>(), Paths::default());
+        let mut slots: Vec<_> = scenes.iter().map(begin).collect();
+        in_parallel(&mut slots, |_, (scene, seed, paths), planner| *paths = Paths::of(world, scene, planner, *seed));
+        paths = slots.into_iter().map(|(.., paths)| paths).collect();
     }
-    rows
+    let shields: &[Shield] = if extent == Extent::All { &[Shield::Off, Shield::On] } else { &[Shield::On] };
+    let baselines: &[Mover<'_>] = if extent == Extent::All { &[Mover::Manual, Mover::Planner] } else { &[] };
+    let movers = || baselines.iter().copied().chain(candidates.iter().map(Mover::Policy));
+    let jobs: Vec<_> = shields.iter().flat_map(|shield| movers().map(move |mover| (*shield, mover))).collect();
+    let mut rows: Vec<Option<Row>> = vec![None; jobs.len()];
+    let (next, finished) = (AtomicUsize::new(0), Mutex::new(&mut rows));
+    std::thread::scope(|scope| {
+        for _ in 0..threads() {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some((shield, mover)) = jobs.get(index) else { break };
+                    let row = measure(world, subtask, scenes, &paths, *shield, *mover);
+                    finished.lock().unwrap_or_else(PoisonError::into_inner)[index] = Some(row);
+                }
+            });
+        }
+    });
+    rows.into_iter().flatten().collect()
+}
+
+/// Who moves.
+#[derive(Clone, Copy)]
+enum Mover<'a> {
+    Manual,
+    Planner,
+    Policy(&'a Candidate),
+}
+
+/// What a policy is compared with in one scene.
+#[derive(Clone, Default)]
+struct Paths {
+    by_hand: Vec<Joints>,
+    by_hand_s: Option<f64>,
+    planned: Option<Vec<Joints>>,
+    planned_s: Option<f64>,
+}
+
+impl Paths {
+    fn of(world: &World, scene: &Scene, planner: &mut Planner, seed: u64) -> Self {
+        let chain = world.chain();
+        let by_hand = manual(world, scene);
+        let by_hand_s = duration(chain, &by_hand, true);
+        let planned = planned(world, scene, planner, seed);
+        let planned_s = planned.as_deref().and_then(|way| duration(chain, way, false));
+        Self { by_hand, by_hand_s, planned, planned_s }
+    }
+}
+
+/// One row: one mover in all scenes.
+fn measure(world: &World, subtask: &str, scenes: &[Scene], paths: &[Paths], shield: Shield, mover: Mover<'_>) -> Row {
+    let both = || scenes.iter().zip(paths);
+    let (method, seed, outcomes, seconds): (_, _, Vec<Outcome>, Vec<Option<f64>>) = match mover {
+        Mover::Manual => {
+            let moved = both().map(|(scene, paths)| follow(world, scene, &paths.by_hand, shield));
+            ("manual", 0, moved.collect(), paths.iter().map(|paths| paths.by_hand_s).collect())
+        }
+        Mover::Planner => {
+            let moved = both().map(|(scene, paths)| match &paths.planned {
+                Some(way) => follow(world, scene, way, shield),
+                None => Outcome::default(),
+            });
+            ("planner", 0, moved.collect(), paths.iter().map(|paths| paths.planned_s).collect())
+        }
+        Mover::Policy(candidate) => {
+            let outcomes = move_by(world, scenes, shield, candidate);
+            let timed = scenes.iter().zip(&outcomes).take(paths.len()).map(|(scene, outcome)| match shield {
+                Shield::Off => duration(world.chain(), &outcome.path, false),
+                // In the cell a preview is shortened where the straight way is clear as well.
+                Shield::On => {
+                    let short = shortened(world, &world.monitor_of(scene, 0.0, 0.0), &outcome.path);
+                    duration(world.chain(), &short, false)
+                }
+            });
+            let seconds = timed.collect();
+            (candidate.method.as_str(), candidate.seed, outcomes, seconds)
+        }
+    };
+    let good: Vec<_> = (0..outcomes.len()).filter(|k| outcomes[*k].arrived && !outcomes[*k].contact).collect();
+    let seconds_of = |k: &usize| *seconds.get(*k)?;
+    let ratio =
+        |to: fn(&Paths) -> Option<f64>| median(good.iter().filter_map(|k| Some(seconds_of(k)? / to(paths.get(*k)?)?)));
+    Row {
+        subtask: subtask.into(),
+        method: method.into(),
+        seed,
+        shielded: shield == Shield::On,
+        reached: Rate::new(good.len(), outcomes.len()),
+        contact: Rate::new(outcomes.iter().filter(|outcome| outcome.contact).count(), outcomes.len()),
+        time_s: median(good.iter().filter_map(seconds_of)),
+        time_over_manual: ratio(|paths| paths.by_hand_s),
+        time_over_planner: ratio(|paths| paths.planned_s),
+    }
 }
 
 /// The middle value; NaN of nothing.
-fn median(values: impl Iterator<Item = f64>) -> f64 {
+pub fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)

@@ -10,7 +10,7 @@ const LOOKS_MAX: u32 = 3_000;
 /// Clearance of a way, metres: wide where there is room, as a learner is not exact.
 const MARGINS: [f64; 2] = [0.060, MARGIN_PLANNED];
 /// Searches of which the quickest way counts.
-const SEARCHES: u64 = 2;
+const SEARCHES: u64 = 3;
 /// What a person is kept off further, metres: they move on meanwhile.
 const PERSON_MORE: f64 = 0.05;
 /// A step of a demonstration, as a share of the largest.

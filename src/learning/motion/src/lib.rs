@@ -39,7 +39,7 @@ pub use bank::{Split, demonstrations, scenes};
 pub use baselines::{follow, manual, planned, shortened};
 pub use course::{CURVE, Course, Progress, folder, run};
 pub use environment::{Environment, INPUTS, STEP_TIME, Shield, Stepped};
-pub use evaluate::{Candidate, Rate, Row, evaluate, move_by};
+pub use evaluate::{Candidate, Extent, Rate, Row, evaluate, median, move_by};
 pub use network::{ALPHA, Network, Pass};
 pub use replay::{Replay, Transition};
 pub use rollouts::{Act, Outcome, rollouts};

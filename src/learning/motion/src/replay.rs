@@ -27,22 +27,24 @@ pub struct Replay {
     kept: Vec<Transition>,
     capacity: usize,
     next: usize,
+    /// Those that were there before it grew.
+    first: usize,
 }
 
 impl Replay {
     /// Room for so many.
     pub fn new(capacity: usize) -> Self {
-        Self { kept: Vec::new(), capacity, next: 0 }
+        Self { kept: Vec::new(), capacity, next: 0, first: 0 }
     }
 
-    /// Keeps one, in place of the oldest where all room is taken.
+    /// Keeps one, in place of the oldest where all room is taken; what was there before it grew stays.
     pub fn push(&mut self, transition: Transition) {
         if self.kept.len() < self.capacity {
             self.kept.push(transition);
         } else {
             self.kept[self.next] = transition;
         }
-        self.next = (self.next + 1) % self.capacity;
+        self.next = if self.next + 1 < self.capacity { self.next + 1 } else { self.first };
     }
 
     /// How many there are.
@@ -55,6 +57,7 @@ impl Replay {
     pub fn grown(mut self, more: usize) -> Self {
         self.next = self.kept.len();
         self.capacity = self.kept.len() + more;
+        self.first = self.kept.len();
         self
     }
 
@@ -68,15 +71,22 @@ impl Replay {
         self.next
     }
 
-    /// All of them as plain numbers.
+    /// All that came after it grew, as plain numbers.
     pub(crate) fn numbers(&self) -> Vec<f32> {
-        self.kept.iter().flat_map(flat).collect()
+        self.kept[self.first..].iter().flat_map(flat).collect()
     }
 
     /// What [`Replay::numbers`] has written.
     pub(crate) fn restore(&mut self, numbers: &[f32], next: usize) {
-        self.kept = numbers.chunks_exact(TRANSITION).map(unflat).collect();
+        self.kept.truncate(self.first);
+        self.kept.extend(numbers.chunks_exact(TRANSITION).map(unflat));
         self.next = next % self.capacity;
+    }
+
+    /// One of those that came after it grew; of all where there are none yet.
+    pub fn draw_late(&self, draws: &mut ChaCha8Rng) -> &Transition {
+        let first = if self.kept.len() > self.first { self.first } else { 0 };
+        &self.kept[draws.random_range(first..self.kept.len())]
     }
 
     /// One of them, drawn.

@@ -20,17 +20,19 @@ use crate::rollouts::{Outcome, rollouts};
 use crate::world::{Joints, Scene, Subtask, World};
 
 /// Environments that are stepped together.
-const ENVIRONMENTS: usize = 16;
+const ENVIRONMENTS: usize = 32;
 /// Updates after each step of all of them.
-const UPDATES: usize = 4;
+const UPDATES: usize = 2;
 /// Largest noise on an action while exploring, at the start of training.
 const NOISE: f32 = 0.15;
 /// Steps kept of the agent's own.
 const OWN_MAX: usize = 60_000;
 /// Room for steps shown beyond the first demonstrations.
 const CORRECTIONS_MAX: usize = 60_000;
+/// Steps before a refused motion from which the way is shown.
+const BEFORE: usize = 3;
 /// Share of the episodes after which the planner shows the way from a place the agent came to: of those that
-/// reached the goal, of those that did not.
+/// reached the goal and were refused nothing, of all others.
 const CORRECTED: [f64; 2] = [0.2, 1.0];
 /// The rate falls to this share of the first, along a cosine.
 const RATE_END: f32 = 0.05;
@@ -194,6 +196,7 @@ impl Run<'_> {
         let mut environments: Vec<_> =
             scene_of.iter().map(|scene| Environment::new(world, &scenes[*scene], Shield::On)).collect();
         let mut visited: Vec<Vec<(Joints, f64)>> = vec![Vec::new(); ENVIRONMENTS];
+        let mut refused: Vec<Option<usize>> = vec![None; ENVIRONMENTS];
         self.episodes += ENVIRONMENTS as u64;
         let (mut states, mut pass) = (vec![0.0; ENVIRONMENTS * INPUTS], Pass::default());
         let end = (self.agent.updates() + self.options.interval).min(self.options.updates);
@@ -213,16 +216,26 @@ impl Run<'_> {
                 }
                 visited[index].push((*environment.joints(), environment.time()));
                 let stepped = environment.step(&action);
+                if stepped.refused && refused[index].is_none() {
+                    refused[index] = Some(visited[index].len() - 1);
+                }
                 let mut state = [0.0; INPUTS];
                 state.copy_from_slice(&states[index * INPUTS..(index + 1) * INPUTS]);
                 self.own.push(transition(state, action, environment, stepped.reward, stepped.arrived));
                 if stepped.over {
-                    if self.draws.random::<f64>() < CORRECTED[usize::from(!stepped.arrived)] {
-                        let place = self.draws.random_range(0..visited[index].len());
+                    let share = CORRECTED[usize::from(!stepped.arrived || refused[index].is_some())];
+                    if self.draws.random::<f64>() < share {
+                        // Up to where a motion was refused first, if any was: there, or a little before.
+                        let (place, there) = match refused[index].take() {
+                            Some(at) if self.draws.random() => (at, true),
+                            Some(at) => (at - self.draws.random_range(0..=at.min(BEFORE)), false),
+                            None => (self.draws.random_range(0..visited[index].len()), false),
+                        };
                         let (joints, time) = visited[index][place];
-                        self.correct(environment, scene_of[index], &joints, time);
+                        self.correct(environment, scene_of[index], &joints, time, there);
                     }
                     visited[index].clear();
+                    refused[index] = None;
                     scene_of[index] = self.draws.random_range(0..scenes.len());
                     let scene = &scenes[scene_of[index]];
                     environment.shield = Shield::On;
@@ -235,22 +248,22 @@ impl Run<'_> {
                 let rate = self.options.tuning.rate * (RATE_END + (1.0 - RATE_END) * cosine);
                 let tuning = Tuning { rate, ..self.options.tuning };
                 let losses = self.agent.update(&self.corrections, &self.own, &tuning, &mut self.draws);
-                // The actor learns every second time.
                 sums[0] += losses.critic;
-                sums[1] += 2.0 * losses.imitation;
+                sums[1] += losses.imitation;
                 count += 1.0;
             }
         }
         sums.map(|sum| sum / count.max(1.0))
     }
 
-    /// The planner shows the way from a place the agent came to and did not get on from.
-    fn correct(&mut self, environment: &mut Environment<'_>, scene: usize, joints: &Joints, time: f64) {
+    /// The planner shows the way from a place the agent came to and did not get on from; `refused`: its motion
+    /// there was refused, so the same is shown for when it is told so.
+    fn correct(&mut self, environment: &mut Environment<'_>, scene: usize, joints: &Joints, time: f64, refused: bool) {
         let Lessons { world, scenes, .. } = *self.lessons;
         let seed = self.draws.random();
         if let Some(way) = expert::way(world, &scenes[scene], joints, time, &mut self.planner, seed) {
             self.corrected += 1;
-            demonstrate(environment, &scenes[scene], &way, time, &mut self.corrections);
+            demonstrate(environment, &scenes[scene], &way, time, refused, &mut self.corrections);
         }
     }
 

@@ -7,10 +7,10 @@ use rand_chacha::ChaCha8Rng;
 use tandem_config::Cell;
 use tandem_cycle::guard::{CountingAllocator, counted};
 use tandem_motion::{
-    Agent, Environment, INPUTS, Lessons, Method, Network, Pass, Replay, Scene, Shield, Split, Subtask, TrainOptions,
-    Tuning, World, demonstrations, duration, evaluate, manual, move_by, rollouts, scenes, train,
+    Agent, Environment, Extent, INPUTS, Lessons, Method, Network, Pass, Replay, Scene, Shield, Split, Subtask,
+    TrainOptions, Tuning, World, demonstrations, duration, evaluate, manual, move_by, rollouts, scenes, train,
 };
-use tandem_policy::{Activations, DOF, Lateral, OBSERVATION, Policy, SCALE, STEP};
+use tandem_policy::{Activations, DOF, Lateral, OBSERVATION, Policy, SCALE, STEP, slopes};
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
@@ -198,6 +198,44 @@ fn scenes_need_a_way_around_and_have_one() {
     assert!(2 * blocked > all, "{blocked} of {all}");
 }
 
+/// What a policy is told of how the clearance grows with each joint is what differences of the clearance say, wherever the same
+/// pair stays the nearest.
+#[test]
+fn slopes_agree_with_differences() {
+    const STEP: f64 = 1e-5;
+    let world = world("s472");
+    let chain = world.chain();
+    let mut compared = 0;
+    for subtask in [Subtask::Grasp, Subtask::Transfer] {
+        for scene in few(&world, subtask, 4) {
+            let monitor = world.monitor_of(&scene, 0.0, 0.0);
+            let at = |q: &[f64; tandem_kinematics::JOINTS_MAX]| monitor.scene_clearance(&chain.forward(q));
+            for pair in scene.way.windows(2) {
+                for share in [0.1, 0.4, 0.7] {
+                    let q = std::array::from_fn(|k| pair[0][k] + share * (pair[1][k] - pair[0][k]));
+                    let here = at(&q);
+                    let slopes = slopes(chain, &chain.forward(&q), &here);
+                    for joint in 0..DOF {
+                        let [mut up, mut down] = [q; 2];
+                        up[joint] += STEP;
+                        down[joint] -= STEP;
+                        let [up, down] = [at(&up), at(&down)];
+                        let same = |c: &tandem_clearance::Clearance| (c.link, c.object) == (here.link, here.object);
+                        let [rise, fall] = [up.distance - here.distance, here.distance - down.distance];
+                        // Where an edge passes a corner the clearance has a kink.
+                        if same(&up) && same(&down) && (rise - fall).abs() < 1e-8 {
+                            let wanted = (up.distance - down.distance) / (2.0 * STEP);
+                            assert!((slopes[joint] - wanted).abs() < 2e-3, "joint {joint}: {} {wanted}", slopes[joint]);
+                            compared += 1;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(compared > 50, "{compared}");
+}
+
 /// Eq. (13) and (15) as mended: nearer to the goal pays more, being refused pays less, and no distance from
 /// obstacles beyond the safe one pays anything. A step is refused exactly where it would come too near, allocates
 /// nothing, and the same steps give the same states.
@@ -283,9 +321,11 @@ fn the_report_measures_all_methods() {
     let (shape, numbers) = agent.policy();
     let candidate = tandem_motion::Candidate { method: "ac".into(), seed: 2, shape, numbers };
     assert_eq!(move_by(&world, &drawn, Shield::On, &candidate).len(), drawn.len());
-    let rows = evaluate(&world, "transfer", &drawn, &[candidate]);
+    let rows = evaluate(&world, "transfer", &drawn, std::slice::from_ref(&candidate), Extent::All);
     assert_eq!(rows.len(), 2 * 3);
     assert!(rows.iter().filter(|row| row.shielded).all(|row| row.contact.count == 0), "{rows:#?}");
+    let shielded = evaluate(&world, "transfer", &drawn, &[candidate], Extent::ShieldedPolicies);
+    assert_eq!(shielded[0].reached, rows[rows.len() - 1].reached);
     for scene in &drawn {
         let path = manual(&world, scene);
         let stopping = duration(world.chain(), &path, true).expect("a duration");
