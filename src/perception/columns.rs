@@ -7,53 +7,64 @@ const LANES: usize = 8;
 /// Coordinate of the points that fill up the last block: farther than anything.
 const NOWHERE: f32 = 1e18;
 
-/// Points as blocks of x, of y and of z.
+/// A block of x, of y and of z.
+pub(crate) type Block = [[f32; LANES]; 3];
+
+/// Points in blocks, the last of which is filled up.
+pub(crate) fn blocks(mut points: impl Iterator<Item = [f32; 3]>) -> impl Iterator<Item = Block> {
+    std::iter::from_fn(move || {
+        let mut block = [[NOWHERE; LANES]; 3];
+        let mut next = points.next();
+        next?;
+        for lane in 0..LANES {
+            let Some(p) = next else { break };
+            for (row, v) in block.iter_mut().zip(p) {
+                row[lane] = v;
+            }
+            next = if lane + 1 < LANES { points.next() } else { None };
+        }
+        Some(block)
+    })
+}
+
+#[inline(always)]
+fn squared([x, y, z]: &Block, p: [f32; 3]) -> [f32; LANES] {
+    std::array::from_fn(|l| {
+        let (dx, dy, dz) = (x[l] - p[0], y[l] - p[1], z[l] - p[2]);
+        dx * dx + dy * dy + dz * dz
+    })
+}
+
+/// Squared distance from `p` to the nearest point of some blocks; huge when there is none.
+#[inline]
+pub(crate) fn nearest(blocks: &[Block], p: [f32; 3]) -> f32 {
+    let mut least = [f32::MAX; LANES];
+    for block in blocks {
+        let d = squared(block, p);
+        for (m, d) in least.iter_mut().zip(d) {
+            *m = if d < *m { d } else { *m };
+        }
+    }
+    least.iter().fold(f32::MAX, |m, d| m.min(*d))
+}
+
+/// Points as blocks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Columns {
-    blocks: Vec<[[f32; LANES]; 3]>,
+    blocks: Vec<Block>,
 }
 
 impl Columns {
-    pub(crate) fn of(points: impl Iterator<Item = [f32; 3]>) -> Self {
-        let mut out = Self::default();
-        out.fill(points);
-        out
+    /// Makes room for this many points.
+    pub(crate) fn reserve(&mut self, points: usize) {
+        self.blocks.clear();
+        self.blocks.reserve(points.div_ceil(LANES));
     }
 
-    /// The same in place; allocates only when it grows.
+    /// Lays points out in place of those before; allocates only when it grows.
     pub(crate) fn fill(&mut self, points: impl Iterator<Item = [f32; 3]>) {
         self.blocks.clear();
-        for (i, p) in points.enumerate() {
-            if i % LANES == 0 {
-                self.blocks.push([[NOWHERE; LANES]; 3]);
-            }
-            if let Some(block) = self.blocks.last_mut() {
-                for (row, v) in block.iter_mut().zip(p) {
-                    row[i % LANES] = v;
-                }
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn squared([x, y, z]: &[[f32; LANES]; 3], p: [f32; 3]) -> [f32; LANES] {
-        std::array::from_fn(|l| {
-            let (dx, dy, dz) = (x[l] - p[0], y[l] - p[1], z[l] - p[2]);
-            dx * dx + dy * dy + dz * dz
-        })
-    }
-
-    /// Squared distance from `p` to the nearest point; huge when there is none.
-    #[inline]
-    pub(crate) fn nearest(&self, p: [f32; 3]) -> f32 {
-        let mut least = [f32::MAX; LANES];
-        for block in &self.blocks {
-            let d = Self::squared(block, p);
-            for (m, d) in least.iter_mut().zip(d) {
-                *m = if d < *m { d } else { *m };
-            }
-        }
-        least.iter().fold(f32::MAX, |m, d| m.min(*d))
+        self.blocks.extend(blocks(points));
     }
 }
 
@@ -62,6 +73,12 @@ impl Columns {
 pub(crate) struct Numbers(Vec<[f32; LANES]>);
 
 impl Numbers {
+    /// Makes room for this many points.
+    pub(crate) fn reserve(&mut self, points: usize) {
+        self.0.clear();
+        self.0.reserve(points.div_ceil(LANES));
+    }
+
     pub(crate) fn fill(&mut self, values: impl Iterator<Item = f32>) {
         self.0.clear();
         for (i, v) in values.enumerate() {
@@ -88,7 +105,7 @@ widest! {
             let p = [x[next % LANES], y[next % LANES], z[next % LANES]];
             let (mut top, mut at) = ([-1.0_f32; LANES], [0_u32; LANES]);
             for (b, ((block, gap), weight)) in points.blocks.iter().zip(&mut gaps.0).zip(&weights.0).enumerate() {
-                let d = Columns::squared(block, p);
+                let d = squared(block, p);
                 for l in 0..LANES {
                     gap[l] = if d[l] < gap[l] { d[l] } else { gap[l] };
                     let reach = gap[l] * weight[l];

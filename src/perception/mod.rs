@@ -50,6 +50,13 @@ pub struct Recognised {
     pub fit: Option<Fit>,
 }
 
+impl Recognised {
+    /// Whether the answer may be acted on: probable enough, and a shape was fitted.
+    pub fn is_sure(&self, threshold: f64) -> bool {
+        f64::from(self.probabilities[self.class.code() as usize]) >= threshold && self.fit.is_some()
+    }
+}
+
 /// The perception role.
 #[derive(Debug)]
 pub struct Perception {
@@ -97,11 +104,8 @@ impl Perception {
         let Some(recognised) = self.recognise(points) else {
             return;
         };
-        let sure = f64::from(recognised.probabilities[recognised.class.code() as usize]) >= self.card().threshold;
-        feature.recognition = Code::of(match recognised.fit {
-            Some(_) if sure => Recognition::Sure,
-            _ => Recognition::Unsure,
-        });
+        let sure = recognised.is_sure(self.card().threshold);
+        feature.recognition = Code::of(if sure { Recognition::Sure } else { Recognition::Unsure });
         feature.class = Code::of(recognised.class);
         feature.segment_count = recognised.segment_count;
         feature.probabilities = recognised.probabilities;

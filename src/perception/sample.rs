@@ -234,8 +234,10 @@ impl Sampler {
     /// Indices of the points kept.
     fn choose(&mut self, offset: f32, kept: &mut Vec<u16>) {
         let [off, on] = &mut self.candidates;
-        off.clear();
-        on.clear();
+        for side in [&mut *off, &mut *on] {
+            side.clear();
+            side.reserve(CANDIDATES[0]);
+        }
         for &i in &self.order {
             let p = self.scaled[usize::from(i)];
             let side = if (p[2] - offset).abs() > PLANE_BAND { &mut *off } else { &mut *on };
@@ -251,6 +253,7 @@ impl Sampler {
         kept.clear();
         for (side, count) in [from_off, from_on].into_iter().enumerate() {
             self.places.clear();
+            self.places.reserve(CANDIDATES[0]);
             self.places.extend(self.candidates[side].iter().map(|&i| self.scaled[usize::from(i)]));
             self.farthest(count);
             kept.extend(self.picked.iter().map(|&k| self.candidates[side][usize::from(k)]));
@@ -260,8 +263,13 @@ impl Sampler {
     /// Farthest-point sampling of `places` with distances weighted towards the middle of the view:
     /// `count` indices into it go to `picked`, the first the one nearest to the middle.
     fn farthest(&mut self, count: usize) {
+        // Room for the most there may be, so that no later cloud needs more.
         self.picked.clear();
+        self.picked.reserve(POINTS);
         self.picked.resize(count.min(self.places.len()), 0);
+        self.columns.reserve(CANDIDATES[0]);
+        self.weights.reserve(CANDIDATES[0]);
+        self.gaps.reserve(CANDIDATES[0]);
         self.columns.fill(self.places.iter().copied());
         self.weights.fill(self.places.iter().map(|p| {
             let off_axis = (p[0] * p[0] + p[1] * p[1]).sqrt();

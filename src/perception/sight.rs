@@ -7,7 +7,7 @@
 
 use tandem_msg::{FEATURE_CLASSES, FeatureClass};
 
-use super::fit::{Fit, fit};
+use super::fit::{Fit, Room, fit};
 use super::model::{Answer, Model};
 use super::sample::{Sample, Sampler, squared, sub};
 
@@ -41,7 +41,9 @@ impl Cut {
     pub fn fill(&mut self, cloud: &[[f32; 3]], ball: &Ball) {
         let limit = ball.radius * ball.radius;
         self.points.clear();
+        self.points.reserve(cloud.len());
         self.index.clear();
+        self.index.reserve(cloud.len());
         for (i, p) in cloud.iter().enumerate() {
             if squared(sub(*p, ball.centre)) < limit {
                 self.points.push(*p);
@@ -63,6 +65,7 @@ pub struct Sight {
     near_answer: Answer,
     closer: bool,
     column: Vec<f32>,
+    room: Room,
 }
 
 impl Sight {
@@ -71,8 +74,17 @@ impl Sight {
     /// Allocates nothing once it has seen a cloud as large.
     pub fn see(&mut self, model: &mut Model, cloud: &[[f32; 3]]) -> bool {
         self.closer = false;
+        self.room.clear();
         if !self.sampler.sample(cloud, &mut self.sample) || !model.answer(&self.sample, &mut self.answer) {
             return false;
+        }
+        if self.near_sample.points.is_empty() {
+            // Room for a closer look, whichever cloud is the first to need one.
+            self.near_sample.clone_from(&self.sample);
+            self.near_answer.clone_from(&self.answer);
+            self.cut.points.reserve(cloud.len());
+            self.cut.index.reserve(cloud.len());
+            self.column.reserve(cloud.len());
         }
         if let Some(ball) = ball(cloud, &self.sample, &self.answer.segment, &mut self.column) {
             self.cut.fill(cloud, &ball);
@@ -92,12 +104,12 @@ impl Sight {
     }
 
     /// Pose and dimensions of a feature of this class, fitted to what was seen of it from nearest; of a
-    /// slot to the whole view, since the surface has to be seen beyond both its ends.
+    /// slot to the whole view, since the surface has to be seen beyond both its ends. Allocates nothing.
     pub fn fit(&self, cloud: &[[f32; 3]], class: FeatureClass) -> Option<Fit> {
         if self.closer && class != FeatureClass::Slot {
-            fit(&self.cut.points, &self.near_sample, &self.near_answer.segment, class)
+            fit(&self.cut.points, &self.near_sample, &self.near_answer.segment, class, &self.room)
         } else {
-            fit(cloud, &self.sample, &self.answer.segment, class)
+            fit(cloud, &self.sample, &self.answer.segment, class, &self.room)
         }
     }
 

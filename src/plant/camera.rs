@@ -101,6 +101,51 @@ pub struct View<'a> {
     pub half_width: f64,
 }
 
+/// What rays are cast at, and from where.
+pub trait Scene {
+    /// Where the camera stands; rays are traced in the frame this is given in.
+    fn frame_from_camera(&self) -> Isometry3<f64>;
+    /// Range of sharpest view and half the width of the field of view at that range, metres.
+    fn field(&self) -> [f64; 2];
+    /// What a ray from `origin` along the unit vector `along` meets between two ranges, metres.
+    fn meet(&self, origin: [f32; 3], along: [f32; 3], near: f32, far: f32) -> Option<Meeting>;
+}
+
+/// Where a ray ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meeting {
+    /// Range, metres.
+    pub range: f32,
+    /// Cosine of the angle of incidence.
+    pub cosine: f32,
+    /// What is there.
+    pub material: Material,
+}
+
+impl Scene for View<'_> {
+    fn frame_from_camera(&self) -> Isometry3<f64> {
+        self.feature_from_camera
+    }
+
+    fn field(&self) -> [f64; 2] {
+        [self.focus, self.half_width]
+    }
+
+    #[inline]
+    fn meet(&self, origin: [f32; 3], along: [f32; 3], near: f32, far: f32) -> Option<Meeting> {
+        let range = self.trace(origin, along, near, far)?;
+        let at = |t: f32| [0, 1, 2].map(|i| origin[i] + t * along[i]);
+        let hit = at(range);
+        let (of_part, material) = self.solid.distance_and_material(hit);
+        let of_scene = of_part.min(self.surroundings.distance(hit));
+        // How fast the distance grows back along the ray.
+        let back = 4.0 * HIT;
+        let cosine = ((self.distance(at(range - back)) - of_scene) / back).clamp(0.0, 1.0);
+        let material = if of_part > of_scene { Material::Surroundings } else { material };
+        Some(Meeting { range, cosine, material })
+    }
+}
+
 impl View<'_> {
     #[inline]
     fn distance(&self, p: [f32; 3]) -> f32 {
@@ -137,25 +182,25 @@ impl View<'_> {
 }
 
 impl Camera {
-    /// Renders up to `points` points of the view and hands each on, in the camera frame
+    /// Renders up to `points` points of the scene and hands each on, in the camera frame
     /// (metres), with what it belongs to; answers how many there were.
     ///
     /// Rays that return nothing are made up for by more rays, up to 1.5 times `points`.
     pub fn render(
         &self,
-        view: &View<'_>,
+        scene: &impl Scene,
         points: usize,
         rng: &mut impl Rng,
         mut point: impl FnMut([f32; 3], Material),
     ) -> usize {
-        let pose = &view.feature_from_camera;
+        let pose = scene.frame_from_camera();
+        let [focus, half_width] = scene.field();
         let matrix = pose.rotation.to_rotation_matrix();
         let rotation: [[f32; 3]; 3] = [0, 1, 2].map(|r| [0, 1, 2].map(|c| matrix[(r, c)] as f32));
         let origin = [0, 1, 2].map(|i| pose.translation.vector[i] as f32);
-        let half_tangent = view.half_width / view.focus;
-        let half_width = view.half_width as f32;
-        let depth = DEPTH_OF_FIELD * view.half_width;
-        let (near, far) = ((view.focus - depth).max(0.2 * view.focus) as f32, (view.focus + depth) as f32);
+        let half_tangent = half_width / focus;
+        let depth = DEPTH_OF_FIELD * half_width;
+        let (near, far) = ((focus - depth).max(0.2 * focus) as f32, (focus + depth) as f32);
 
         let mut place = [rng.random::<f64>(), rng.random::<f64>()];
         let mut seen = 0;
@@ -168,27 +213,21 @@ impl Camera {
             let scale = 1.0 / (1.0 + across[0] * across[0] + across[1] * across[1]).sqrt();
             let ray = [across[0] * scale, across[1] * scale, scale];
             let along = rotation.map(|r| r[0] * ray[0] + r[1] * ray[1] + r[2] * ray[2]);
-            let Some(range) = view.trace(origin, along, near, far) else {
+            let Some(Meeting { range, cosine, material }) = scene.meet(origin, along, near, far) else {
                 continue;
             };
-
-            let at = |t: f32| [0, 1, 2].map(|i| origin[i] + t * along[i]);
-            let hit = at(range);
-            let (of_part, material) = view.solid.distance_and_material(hit);
-            let of_scene = of_part.min(view.surroundings.distance(hit));
-            // Cosine of incidence: how fast the distance grows back along the ray.
-            let back = 4.0 * HIT;
-            let cosine = ((view.distance(at(range - back)) - of_scene) / back).clamp(0.0, 1.0);
             let lost = ((GRAZING[0] - cosine) / (GRAZING[0] - GRAZING[1])).clamp(0.0, 1.0);
             if rng.random::<f32>() < lost + self.dropout as f32 {
                 continue;
             }
             let gauss: f32 = StandardNormal.sample(rng);
             let sigma = self.range_sigma as f32 * (0.5 + 0.5 / cosine.max(0.2));
-            let stray =
-                if rng.random::<f32>() < self.outliers as f32 { half_width * rng.random_range(-0.5..0.5) } else { 0.0 };
+            let stray = if rng.random::<f32>() < self.outliers as f32 {
+                half_width as f32 * rng.random_range(-0.5..0.5)
+            } else {
+                0.0
+            };
             let range = range + sigma * gauss + stray;
-            let material = if of_part > of_scene { Material::Surroundings } else { material };
             point(ray.map(|v| v * range), material);
             seen += 1;
         }

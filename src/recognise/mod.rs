@@ -1,16 +1,19 @@
 //! Recognition of what comes in files: clouds and meshes of other people's parts.
 //!
 //! [`read`] turns a file into a [`Shape`], checked and in metres; [`in_camera`] brings it before a
-//! camera: a cloud in a camera's frame as it is, any other as seen from above, a mesh scanned by
-//! rays. What comes out is what perception reads.
+//! camera: a cloud in a camera's frame as it is, any other as seen from above, a mesh as the plant's
+//! camera sees it on a carrier. What comes out is what perception reads. [`score`] does so with a
+//! folder of parts whose classes are known.
 
 mod cloud;
 mod mesh;
 mod scan;
+mod set;
 
 use std::path::{Path, PathBuf};
 
 pub use scan::{View, in_camera};
+pub use set::{Score, score};
 
 /// Points a cloud is thinned to when it has more than perception takes.
 const POINTS_MAX: usize = 20_000;

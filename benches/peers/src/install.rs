@@ -52,6 +52,28 @@ pub fn python(name: &str, packages: &[&str]) -> Result<Python, Absent> {
     Ok(python)
 }
 
+/// What PyTorch imports, and the CUDA libraries its wheel cannot do without; the rest are stood in for.
+const PYTORCH: &str = "torch==2.15.0";
+const PYTORCH_NEEDS: [&str; 6] = ["typing_extensions", "sympy", "networkx", "jinja2", "fsspec", "filelock"];
+const PYTORCH_CUDA: [&str; 2] = ["nvidia-cuda-runtime", "nvidia-cuda-cupti"];
+
+/// A Python environment called `name` with these packages and PyTorch, of which only the processor's part works: the
+/// wheel (540 MB) comes without the 3 GB of CUDA libraries it names.
+///
+/// # Errors
+/// As [`python`]; no `gcc`, no binutils.
+pub fn pytorch(name: &str, packages: &[&str]) -> Result<Python, Absent> {
+    let python = python(name, &[packages, &PYTORCH_NEEDS].concat())?;
+    let stubs = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/stubs.py");
+    once(&python.venv.join("pytorch"), PYTORCH, || {
+        eprintln!("installing {PYTORCH} into {}", python.venv.display());
+        let pip = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", PYTORCH];
+        run(python.command().args(pip).args(PYTORCH_CUDA))?;
+        run(python.command().arg(stubs)).map(drop)
+    })?;
+    Ok(python)
+}
+
 /// Compiles one C++ file with `g++ -O3 -march=native -DNDEBUG` and these flags; answers the program.
 ///
 /// # Errors

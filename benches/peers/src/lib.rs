@@ -18,7 +18,7 @@
 //! ```
 //!
 //! A peer that lives in a crate is simply called. Any other is a [`Program`] that answers one
-//! round a line; [`python`], [`cpp`] and [`cargo`] make one from public packages, below
+//! round a line; [`python`], [`pytorch`], [`cpp`] and [`cargo`] make one from public packages, below
 //! `target/peers`, once. What cannot be had (no compiler, no network) is skipped aloud.
 //!
 //! `cargo bench` measures. A bench that `cargo test` runs (`harness = false`, `test = true`)
@@ -29,5 +29,5 @@ mod install;
 mod program;
 
 pub use compare::{Bench, Contender, Row, per_call};
-pub use install::{Python, cargo, cpp, python};
+pub use install::{Python, cargo, cpp, python, pytorch};
 pub use program::{Absent, Program};

@@ -20,6 +20,9 @@ use crate::perception::{CARD_FILE, Model, ModelError, Perception, Sampler, WEIGH
 use crate::plant::camera::{Camera, TILT, View, feature_from_camera, half_width};
 use crate::plant::solid::{Solid, Surroundings};
 
+#[global_allocator]
+static ALLOCATOR: tandem_cycle::guard::CountingAllocator = tandem_cycle::guard::CountingAllocator;
+
 fn shipped() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("config/models/s471")
 }
@@ -109,6 +112,18 @@ fn the_engine_answers_what_the_network_does() {
         let off = pairs.map(|(own, theirs)| (own - theirs).abs() / theirs.abs().max(1.0)).fold(0.0, f32::max);
         assert!(off < 1e-4, "{}: {off} off", example.class);
     }
+}
+
+/// Trained twice from the same seed, by one thread and by two, the files are the same bytes.
+#[test]
+fn a_training_repeats_to_the_byte() {
+    let files = [1, 2].map(|threads| {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let options = TrainOptions { threads, samples: 96, ..options(folder.path(), 2) };
+        train(&options, &mut |_| {}).expect("it trains");
+        [WEIGHTS_FILE, CARD_FILE].map(|name| std::fs::read(folder.path().join(name)).expect("it was written"))
+    });
+    assert!(files[0] == files[1]);
 }
 
 /// Any number of threads trains the same network, bit for bit.
@@ -324,6 +339,26 @@ fn perception_answers_new_clouds_only_and_repeatably() {
     let mut again = Feature::default();
     Perception::load(&shipped()).expect("sound").cycle(Stamp(9), &cloud, &mut again);
     assert_eq!(first, again);
+}
+
+/// Sampling, both looks and the fits of every class allocate nothing once as large a cloud was seen.
+#[test]
+fn a_recognition_allocates_nothing() {
+    let mut perception = Perception::load(&shipped()).expect("the shipped model loads");
+    let (mut sampler, mut clouds, mut classes) = (Sampler::new(), Vec::new(), [0; FEATURE_CLASSES]);
+    for index in 0..40 {
+        let mut cloud = Vec::new();
+        example(&Domain::source(), 11, Split::Test, index, &mut sampler, &mut cloud);
+        clouds.push(cloud);
+    }
+    clouds.sort_by_key(|cloud| std::cmp::Reverse(cloud.len()));
+    for (i, cloud) in clouds.iter().enumerate() {
+        let (seen, calls) = tandem_cycle::guard::counted(|| perception.recognise(cloud));
+        let seen = seen.expect("there is enough to see");
+        classes[seen.class.code() as usize] += 1;
+        assert!(i == 0 || calls.is_none(), "cloud {i}, {}: {calls:?}", seen.class);
+    }
+    assert!(classes.iter().filter(|count| **count > 0).count() >= 7, "{classes:?}");
 }
 
 /// A faulty camera gets no answer, and no panic.

@@ -1,10 +1,12 @@
 //! Buckles: the upright box around the hooks.
 
+use bumpalo::Bump;
+use bumpalo::collections::CollectIn;
 use nalgebra::{Vector2, Vector3};
 use tandem_msg::FeatureDimensions;
 
 use super::plane::Plane;
-use super::{Dense, Fit, Frame, Local, measured, quantile, wide};
+use super::{Dense, Fit, Frame, List, Local, measured, quantile, wide};
 use crate::perception::sample::Sample;
 
 /// Directions tried over a right angle.
@@ -15,21 +17,22 @@ const SLOPE_WEIGHT: f64 = 0.4;
 const SLOPING: std::ops::Range<f64> = 0.2..0.93;
 
 /// Fits a buckle: direction, centre of the foot, length, width, height.
-pub(crate) fn fit(plane: &Plane, dense: &Dense, sample: &Sample, segment: &[bool]) -> Option<Fit> {
+pub(crate) fn fit(plane: &Plane, dense: &Dense<'_>, sample: &Sample, segment: &[bool], room: &Bump) -> Option<Fit> {
     let middle = dense.feature.iter().sum::<Vector3<f64>>() / dense.feature.len() as f64;
     let frame = Frame::on(middle - plane.normal * plane.height(middle), plane.normal);
-    let local: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
-    let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
+    let local: List<'_, Local> = dense.feature.iter().map(|p| frame.local(*p)).collect_in(room);
+    let mut heights: List<'_, f64> = local.iter().map(|p| p.z).collect_in(room);
     let top = quantile(&mut heights, 0.98);
     let spacing = 0.02 * top;
     // Points of the surface itself do not show the outline.
-    let upper: Vec<&Local> = local.iter().filter(|p| p.z > 0.12 * top).collect();
+    let upper: List<'_, &Local> = local.iter().filter(|p| p.z > 0.12 * top).collect_in(room);
     if upper.len() < 8 {
         return None;
     }
-    let extents = |along: Vector2<f64>, low: f64, high: f64| {
-        let mut values: Vec<f64> =
-            upper.iter().filter(|p| p.z >= low && p.z <= high).map(|p| along.dot(&p.xy())).collect();
+    let mut values = List::with_capacity_in(upper.len(), room);
+    let mut extents = |along: Vector2<f64>, low: f64, high: f64| {
+        values.clear();
+        values.extend(upper.iter().filter(|p| p.z >= low && p.z <= high).map(|p| along.dot(&p.xy())));
         // From well inside on to the very ends, which stray points have moved.
         let [a, b, c, d] = [0.01, 0.02, 0.98, 0.99].map(|share| quantile(&mut values, share));
         [a - (b - a), d + (d - c)]
@@ -38,7 +41,7 @@ pub(crate) fn fit(plane: &Plane, dense: &Dense, sample: &Sample, segment: &[bool
         let (sin, cos) = (std::f64::consts::FRAC_PI_2 * k as f64 / DIRECTIONS as f64).sin_cos();
         [Vector2::new(cos, sin), Vector2::new(-sin, cos)]
     };
-    let area = |k: usize| {
+    let mut area = |k: usize| {
         direction(k).iter().fold(1.0, |area, d| {
             let [a, b] = extents(*d, 0.0, f64::MAX);
             area * (b - a)

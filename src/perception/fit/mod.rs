@@ -7,6 +7,8 @@
 //!    the outline of a slot ([`slot`]), the box of a buckle ([`hook`]), the pitch of a
 //!    thread by its periodicity along the helix ([`thread`]).
 //!
+//! What is laid out on the way lies in room made beforehand, so that a fit allocates nothing.
+//!
 //! Everything is deterministic: random choices come from a generator with a fixed seed.
 //! Lengths in metres, in the camera frame unless said otherwise.
 
@@ -16,12 +18,14 @@ mod round;
 mod slot;
 mod thread;
 
+use bumpalo::Bump;
+use bumpalo::collections::CollectIn;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tandem_msg::{FeatureClass, FeatureDimensions, Measured};
 
-use super::columns::Columns;
+use super::columns::{Block, blocks, nearest};
 use super::sample::Sample;
 use plane::Plane;
 
@@ -29,6 +33,36 @@ use plane::Plane;
 const DENSE: usize = 10_000;
 /// Feature points below which nothing is fitted.
 const SEGMENT_MIN: usize = 8;
+
+/// A list that lies in a fit's room.
+pub(crate) type List<'r, T> = bumpalo::collections::Vec<'r, T>;
+
+/// What the fits to one cloud lay out, bytes.
+const ROOM: usize = 24 << 20;
+
+/// Room for the fits to one cloud; it grows only for clouds larger than perception takes.
+#[derive(Debug)]
+pub struct Room(Bump);
+
+impl Room {
+    /// Forgets what was laid out.
+    pub(crate) fn clear(&mut self) {
+        self.0.reset();
+    }
+}
+
+impl Default for Room {
+    fn default() -> Self {
+        Self(Bump::with_capacity(ROOM))
+    }
+}
+
+impl Clone for Room {
+    /// Room as large: what is in it means nothing between fits.
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
 
 /// Where a feature is and how large.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,40 +112,41 @@ impl Frame {
 }
 
 /// Dense points, told apart.
-pub(crate) struct Dense {
+pub(crate) struct Dense<'r> {
     /// On the feature.
-    pub(crate) feature: Vec<Vector3<f64>>,
+    pub(crate) feature: List<'r, Vector3<f64>>,
     /// Elsewhere.
-    pub(crate) rest: Vec<Vector3<f64>>,
+    pub(crate) rest: List<'r, Vector3<f64>>,
 }
 
 /// Fits the feature of a class to a cloud (metres, camera frame), its sample and the sample's
-/// segment. `None` when nothing can be fitted.
-pub fn fit(cloud: &[[f32; 3]], sample: &Sample, segment: &[bool], class: FeatureClass) -> Option<Fit> {
+/// segment, laid out in `room`. `None` when nothing can be fitted.
+pub fn fit(cloud: &[[f32; 3]], sample: &Sample, segment: &[bool], class: FeatureClass, room: &Room) -> Option<Fit> {
+    let room = &room.0;
     let mut rng = ChaCha8Rng::seed_from_u64(0x5eed);
-    let dense = spread(cloud, sample, segment);
-    let surface = plane::surface(cloud, sample, segment, &dense, &mut rng);
+    let dense = spread(cloud, sample, segment, room);
+    let surface = plane::surface(cloud, sample, segment, &dense, room, &mut rng);
     if class == FeatureClass::Other || dense.feature.len() < SEGMENT_MIN {
         return surface.map(|plane| bare(&plane, &dense));
     }
     let fit = match class {
-        FeatureClass::Slot => slot::fit(&surface?, &dense),
-        FeatureClass::Buckle => hook::fit(&surface?, &dense, sample, segment),
-        _ => round::fit(surface.as_ref(), cloud, sample, segment, &dense, class, &mut rng),
+        FeatureClass::Slot => slot::fit(&surface?, &dense, room),
+        FeatureClass::Buckle => hook::fit(&surface?, &dense, sample, segment, room),
+        _ => round::fit(surface.as_ref(), cloud, sample, segment, &dense, class, room, &mut rng),
     };
-    fit.filter(|fit| near(fit, &dense.feature))
+    fit.filter(|fit| near(fit, &dense.feature, room))
 }
 
 /// Whether the origin lies where the feature's points are: a fit that ran away is none.
-fn near(fit: &Fit, feature: &[Vector3<f64>]) -> bool {
+fn near(fit: &Fit, feature: &[Vector3<f64>], room: &Bump) -> bool {
     let middle = feature.iter().sum::<Vector3<f64>>() / feature.len() as f64;
-    let mut reach: Vec<f64> = feature.iter().map(|p| (p - middle).norm()).collect();
+    let mut reach: List<'_, f64> = feature.iter().map(|p| (p - middle).norm()).collect_in(room);
     (fit.camera_from_feature.translation.vector - middle).norm() < 2.0 * quantile(&mut reach, 0.9)
 }
 
 /// Where there is no feature to locate: the point of the surface the camera looks at, or the
 /// middle of what stands on it.
-fn bare(plane: &Plane, dense: &Dense) -> Fit {
+fn bare(plane: &Plane, dense: &Dense<'_>) -> Fit {
     let at = if dense.feature.len() >= SEGMENT_MIN {
         let mid = dense.feature.iter().sum::<Vector3<f64>>() / dense.feature.len() as f64;
         mid - plane.normal * plane.height(mid)
@@ -129,16 +164,17 @@ fn bare(plane: &Plane, dense: &Dense) -> Fit {
 }
 
 /// Labels of the dense points: each takes that of the nearest sampled point.
-fn spread(cloud: &[[f32; 3]], sample: &Sample, segment: &[bool]) -> Dense {
-    let of = |wanted: bool| {
+fn spread<'r>(cloud: &[[f32; 3]], sample: &Sample, segment: &[bool], room: &'r Bump) -> Dense<'r> {
+    let of = |wanted: bool| -> List<'_, Block> {
         let chosen = sample.source.iter().zip(segment).filter(move |(_, s)| **s == wanted);
-        Columns::of(chosen.map(|(&i, _)| cloud[usize::from(i)]))
+        blocks(chosen.map(|(&i, _)| cloud[usize::from(i)])).collect_in(room)
     };
     let (on, off) = (of(true), of(false));
-    let mut dense = Dense { feature: Vec::new(), rest: Vec::new() };
+    let count = cloud.len().min(DENSE);
+    let mut dense = Dense { feature: List::with_capacity_in(count, room), rest: List::with_capacity_in(count, room) };
     let stride = cloud.len().div_ceil(DENSE).max(1);
     for p in cloud.iter().step_by(stride) {
-        let to = if on.nearest(*p) < off.nearest(*p) { &mut dense.feature } else { &mut dense.rest };
+        let to = if nearest(&on, *p) < nearest(&off, *p) { &mut dense.feature } else { &mut dense.rest };
         to.push(wide(*p));
     }
     dense

@@ -1,10 +1,12 @@
 //! The part's surface around a feature.
 
+use bumpalo::Bump;
+use bumpalo::collections::CollectIn;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::{Dense, quantile, wide};
+use super::{Dense, List, quantile, wide};
 use crate::perception::sample::{Sample, dot, squared, sub};
 
 /// Half thickness in which a point counts, in scaled units of the sample.
@@ -35,22 +37,23 @@ pub(crate) fn surface(
     cloud: &[[f32; 3]],
     sample: &Sample,
     segment: &[bool],
-    dense: &Dense,
+    dense: &Dense<'_>,
+    room: &Bump,
     rng: &mut ChaCha8Rng,
 ) -> Option<Plane> {
     // In scaled units about the sample's centre, along the camera's axes.
-    let places: Vec<[f32; 3]> =
-        sample.source.iter().map(|&i| sub(cloud[usize::from(i)], sample.centre).map(|v| v / sample.scale)).collect();
-    let normals: Vec<[f32; 3]> = (0..places.len()).map(|i| sample.normal_in_camera(i)).collect();
+    let scaled = |&i: &u16| sub(cloud[usize::from(i)], sample.centre).map(|v| v / sample.scale);
+    let places: List<'_, [f32; 3]> = sample.source.iter().map(scaled).collect_in(room);
+    let normals: List<'_, [f32; 3]> = (0..places.len()).map(|i| sample.normal_in_camera(i)).collect_in(room);
     let place = |i: usize| places[i];
-    let feature: Vec<usize> = (0..segment.len()).filter(|&i| segment[i]).collect();
-    let mut voters: Vec<(f32, usize)> = (0..segment.len())
+    let feature: List<'_, usize> = (0..segment.len()).filter(|&i| segment[i]).collect_in(room);
+    let mut voters: List<'_, (f32, usize)> = (0..segment.len())
         .filter(|&i| !segment[i])
         .map(|i| {
             let gap = feature.iter().map(|&f| squared(sub(place(i), place(f)))).fold(f32::INFINITY, f32::min);
             (if gap.is_finite() { gap } else { squared(place(i)) }, i)
         })
-        .collect();
+        .collect_in(room);
     voters.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     voters.truncate(VOTERS);
     if voters.len() < 8 {
@@ -75,26 +78,28 @@ pub(crate) fn surface(
     if votes < 10 || votes * 5 < voters.len() {
         return None;
     }
-    let voting: Vec<Vector3<f64>> = voters
+    let voting: List<'_, Vector3<f64>> = voters
         .iter()
         .filter(|(_, j)| (dot(normal, place(*j)) - offset).abs() < BAND)
         .map(|(_, j)| wide(cloud[usize::from(sample.source[*j])]))
-        .collect();
+        .collect_in(room);
     let middle = voting.iter().sum::<Vector3<f64>>() / voting.len() as f64;
     let reach = 1.3 * voting.iter().map(|p| (p - middle).norm()).fold(0.0, f64::max);
-    let near: Vec<Vector3<f64>> = dense.rest.iter().copied().filter(|p| (p - middle).norm() < reach).collect();
+    let near: List<'_, Vector3<f64>> =
+        dense.rest.iter().copied().filter(|p| (p - middle).norm() < reach).collect_in(room);
 
     let normal = wide(normal);
     let mut plane =
         Plane { normal, offset: normal.dot(&wide(sample.centre)) + f64::from(offset * sample.scale), rms: 0.0 };
     let mut band = f64::from(BAND * sample.scale);
     for _ in 0..4 {
-        let on: Vec<Vector3<f64>> = near.iter().copied().filter(|p| plane.height(*p).abs() < band).collect();
+        let on: List<'_, Vector3<f64>> =
+            near.iter().copied().filter(|p| plane.height(*p).abs() < band).collect_in(room);
         if on.len() < 10 {
             return None;
         }
         plane = least_squares(&on);
-        let mut off: Vec<f64> = on.iter().map(|p| plane.height(*p).abs()).collect();
+        let mut off: List<'_, f64> = on.iter().map(|p| plane.height(*p).abs()).collect_in(room);
         // 1.48 median deviations are a standard deviation.
         band = (4.5 * quantile(&mut off, 0.5)).clamp(20e-6, band);
     }

@@ -1,12 +1,14 @@
 //! Holes, axes and cones: a surface of revolution about the feature's axis.
 
+use bumpalo::Bump;
+use bumpalo::collections::CollectIn;
 use nalgebra::{SMatrix, SVector, Vector2, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use tandem_msg::{FeatureClass, FeatureDimensions, Measured};
 
 use super::plane::Plane;
-use super::{Dense, Fit, Frame, Local, measured, quantile, thread, wide};
+use super::{Dense, Fit, Frame, List, Local, measured, quantile, thread, wide};
 use crate::perception::sample::Sample;
 
 const CIRCLES: usize = 160;
@@ -52,29 +54,31 @@ impl Wall {
 }
 
 /// Fits a hole, axis or cone.
+#[allow(clippy::too_many_arguments, reason = "all that was seen, and room")]
 pub(crate) fn fit(
     surface: Option<&Plane>,
     cloud: &[[f32; 3]],
     sample: &Sample,
     segment: &[bool],
-    dense: &Dense,
+    dense: &Dense<'_>,
     class: FeatureClass,
+    room: &Bump,
     rng: &mut ChaCha8Rng,
 ) -> Option<Fit> {
     let middle = dense.feature.iter().sum::<Vector3<f64>>() / dense.feature.len() as f64;
-    let mut distances: Vec<f64> = dense.feature.iter().map(|p| (p - middle).norm()).collect();
+    let mut distances: List<'_, f64> = dense.feature.iter().map(|p| (p - middle).norm()).collect_in(room);
     let shown = Shown {
         points: segment
             .iter()
             .enumerate()
             .filter(|(_, s)| **s)
             .map(|(i, _)| (wide(cloud[usize::from(sample.source[i])]), wide(sample.smooth_normal_in_camera(i))))
-            .collect(),
+            .collect_in(room),
         reach: quantile(&mut distances, 0.95),
     };
     let mut best: Option<(f64, Frame, Wall, bool)> = None;
     let mut consider = |frame: Frame, lean: f64, on_surface: bool, rng: &mut ChaCha8Rng| {
-        if let Some(wall) = wall(&frame, dense, class, lean, rng) {
+        if let Some(wall) = wall(&frame, dense, class, lean, room, rng) {
             let score = shown.agreement(&frame, &wall) / if on_surface { SURFACE } else { 1.0 };
             if best.as_ref().is_none_or(|b| score > b.0) {
                 best = Some((score, frame, wall, on_surface));
@@ -87,22 +91,22 @@ pub(crate) fn fit(
     }
     // What stands out may stand on no surface that is seen: a plug at the end of a cable.
     if !matches!(class, FeatureClass::ThreadedHole | FeatureClass::SmoothHole) {
-        for axis in shown.axes(rng) {
+        for axis in shown.axes(room, rng) {
             consider(Frame::on(middle, axis), LEAN[1], false, rng);
         }
     }
     let (_, frame, wall, on_surface) = best?;
-    Some(finish(&frame, &wall, on_surface, dense, class, sample))
+    Some(finish(&frame, &wall, on_surface, dense, class, sample, room))
 }
 
 /// The feature's sampled points with their smooth normals, in the camera frame.
-struct Shown {
-    points: Vec<(Vector3<f64>, Vector3<f64>)>,
+struct Shown<'r> {
+    points: List<'r, (Vector3<f64>, Vector3<f64>)>,
     /// Distance from their middle that nearly all keep.
     reach: f64,
 }
 
-impl Shown {
+impl<'r> Shown<'r> {
     /// Share of the points that lie on the wall with its normal, or face along the axis within it as a cap
     /// or floor does.
     fn agreement(&self, frame: &Frame, wall: &Wall) -> f64 {
@@ -124,10 +128,11 @@ impl Shown {
 
     /// Axes worth trying, out of the part: the one most normals keep a common angle to, and those that
     /// flat patches, such as the end of a pin, look along.
-    fn axes(&self, rng: &mut ChaCha8Rng) -> Vec<Vector3<f64>> {
-        let normals: Vec<Vector3<f64>> = self.points.iter().map(|(_, n)| *n).collect();
+    fn axes(&self, room: &'r Bump, rng: &mut ChaCha8Rng) -> List<'r, Vector3<f64>> {
+        let normals: List<'_, Vector3<f64>> = self.points.iter().map(|(_, n)| *n).collect_in(room);
+        let mut axes = List::with_capacity_in(1 + PATCHES, room);
         if normals.len() < 12 {
-            return Vec::new();
+            return axes;
         }
         let mut round: (usize, Vector3<f64>) = (0, Vector3::zeros());
         for _ in 0..AXES {
@@ -148,47 +153,55 @@ impl Shown {
                 round = (votes, axis);
             }
         }
-        let mut axes = Vec::with_capacity(1 + PATCHES);
         if round.0 * 4 >= normals.len() {
             axes.push(round.1);
         }
-        let mut left = normals.clone();
+        let count = normals.len();
+        let mut left = normals;
         for _ in 0..PATCHES {
             let alike = |n: &Vector3<f64>| left.iter().filter(|m| n.dot(m) > FLAT).count();
             let Some(patch) = left.iter().copied().max_by_key(alike) else { break };
-            let (on, off): (Vec<_>, Vec<_>) = left.iter().partition(|m| patch.dot(m) > FLAT);
-            if on.len() * 10 < normals.len() {
+            let on = |m: &Vector3<f64>| patch.dot(m) > FLAT;
+            if left.iter().filter(|m| on(m)).count() * 10 < count {
                 break;
             }
-            axes.push(on.iter().sum::<Vector3<f64>>().normalize());
-            left = off;
+            axes.push(left.iter().filter(|m| on(m)).sum::<Vector3<f64>>().normalize());
+            left.retain(|m| !on(m));
         }
         // Out of the part: towards the camera.
-        axes.iter().map(|axis| if axis.z > 0.0 { -*axis } else { *axis }).collect()
+        axes.iter_mut().for_each(|axis| *axis = if axis.z > 0.0 { -*axis } else { *axis });
+        axes
     }
 }
 
 /// The wall among the feature's points, given a frame with z near its axis.
-fn wall(frame: &Frame, dense: &Dense, class: FeatureClass, lean: f64, rng: &mut ChaCha8Rng) -> Option<Wall> {
-    let local: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
-    let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
+fn wall(
+    frame: &Frame,
+    dense: &Dense<'_>,
+    class: FeatureClass,
+    lean: f64,
+    room: &Bump,
+    rng: &mut ChaCha8Rng,
+) -> Option<Wall> {
+    let mut flank: List<'_, Local> = dense.feature.iter().map(|p| frame.local(*p)).collect_in(room);
+    let mut heights: List<'_, f64> = flank.iter().map(|p| p.z).collect_in(room);
     let (low, high) = (quantile(&mut heights, 0.03), quantile(&mut heights, 0.97));
     let span = high - low;
     // Floor, cap and chamfer are not wall.
-    let flank: Vec<Local> = local.into_iter().filter(|p| p.z > low + 0.10 * span && p.z < high - 0.08 * span).collect();
+    flank.retain(|p| p.z > low + 0.10 * span && p.z < high - 0.08 * span);
     if flank.len() < 10 {
         return None;
     }
     let cone = class == FeatureClass::Cone;
-    let start = guess(&flank, cone, rng)?;
-    refine(start, &flank, lean, cone)
+    let start = guess(&flank, cone, room, rng)?;
+    refine(start, &flank, lean, cone, room)
 }
 
 /// The upright wall most flank points lie on: a circle through three points, for a cone
 /// three of about the same height and a fourth to say how the radius changes.
-fn guess(flank: &[Local], cone: bool, rng: &mut ChaCha8Rng) -> Option<Wall> {
+fn guess(flank: &[Local], cone: bool, room: &Bump, rng: &mut ChaCha8Rng) -> Option<Wall> {
     let stride = flank.len().div_ceil(VOTERS);
-    let mut voters: Vec<&Local> = flank.iter().step_by(stride).collect();
+    let mut voters: List<'_, &Local> = flank.iter().step_by(stride).collect_in(room);
     voters.sort_unstable_by(|a, b| a.z.total_cmp(&b.z));
     let count = voters.len();
     let slice = if cone { (count / 8).max(4).min(count) } else { count };
@@ -243,14 +256,15 @@ fn through(a: Vector2<f64>, b: Vector2<f64>, c: Vector2<f64>) -> Option<(Vector2
 
 /// Gauss–Newton on centre, lean, radius and slope, with Tukey weights. `lean` is the prior
 /// standard deviation of the lean, radians; cylinders keep their slope at nothing.
-fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall> {
+fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool, room: &Bump) -> Option<Wall> {
+    let mut off_wall = List::with_capacity_in(flank.len(), room);
     let start = flank.iter().map(|p| wall.radius + wall.slope * p.z).sum::<f64>() / flank.len() as f64;
     let mut reach = 0.2 * start;
     for _ in 0..12 {
         let mut normal = SMatrix::<f64, 6, 6>::zeros();
         let mut right = SVector::<f64, 6>::zeros();
         let (mut squares, mut weight_sum, mut inliers) = (0.0, 0.0, 0);
-        let mut off_wall = Vec::with_capacity(flank.len());
+        off_wall.clear();
         for p in flank {
             let (off, e) = wall.distance(p);
             off_wall.push(e.abs());
@@ -295,35 +309,43 @@ fn refine(mut wall: Wall, flank: &[Local], lean: f64, cone: bool) -> Option<Wall
     sane.then_some(wall)
 }
 
-fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: FeatureClass, sample: &Sample) -> Fit {
+fn finish(
+    frame: &Frame,
+    wall: &Wall,
+    on_surface: bool,
+    dense: &Dense<'_>,
+    class: FeatureClass,
+    sample: &Sample,
+    room: &Bump,
+) -> Fit {
     let axis = Vector3::new(wall.lean.x, wall.lean.y, 1.0).normalize();
     // Along the axis from the frame's plane; inside the rim, so that chamfers do not count.
-    let local: Vec<Local> = dense.feature.iter().map(|p| frame.local(*p)).collect();
-    let mut heights: Vec<f64> = local.iter().map(|p| p.z).collect();
+    let local: List<'_, Local> = dense.feature.iter().map(|p| frame.local(*p)).collect_in(room);
+    let mut heights: List<'_, f64> = local.iter().map(|p| p.z).collect_in(room);
     let sunk = quantile(&mut heights, 0.5) < 0.0 && on_surface;
     // Of what it stands on, a cable say, some may have been taken for it: that is not on the wall.
-    let mut on_wall: Vec<f64> =
-        local.iter().filter(|p| wall.distance(p).1.abs() < 0.1 * wall.radius.abs()).map(|p| p.z).collect();
+    let mut on_wall: List<'_, f64> =
+        local.iter().filter(|p| wall.distance(p).1.abs() < 0.1 * wall.radius.abs()).map(|p| p.z).collect_in(room);
     let base = if on_surface { 0.0 } else { quantile(&mut on_wall, 0.01) };
     // The end of a sharp cone shows few points.
     let last = if class == FeatureClass::Cone { 0.01 } else { 0.04 };
     let end = quantile(&mut heights, if sunk { last } else { 1.0 - last });
-    let end = level(&heights, end, 0.04 * (end - base).abs());
+    let end = level(&heights, end, 0.04 * (end - base).abs(), room);
     let spacing = 2.0 * f64::from(sample.scale) / 100.0;
     let depth = measured((end - base).abs(), 0.3 * spacing + 0.01 * (end - base).abs());
 
     // Neither floor nor chamfer.
     let (from, to) = (base.min(end), base.max(end));
     let inside = from + 0.06 * (to - from)..to - 0.06 * (to - from);
-    let flank: Vec<[f64; 3]> = local
+    let flank: List<'_, [f64; 3]> = local
         .iter()
         .filter(|p| inside.contains(&p.z))
         .filter_map(|p| {
             let (off, e) = wall.distance(p);
             (e.abs() < 0.2 * wall.radius).then(|| [p.z, off.y.atan2(off.x), e])
         })
-        .collect();
-    let wound = if class == FeatureClass::Cone { None } else { thread::wound(&flank, wall.radius) };
+        .collect_in(room);
+    let wound = if class == FeatureClass::Cone { None } else { thread::wound(&flank, wall.radius, room) };
     let (diameter, pitch) = match class {
         FeatureClass::ThreadedHole | FeatureClass::ThreadedAxis => {
             let pitch = wound.unwrap_or_default().pitch;
@@ -351,7 +373,7 @@ fn finish(frame: &Frame, wall: &Wall, on_surface: bool, dense: &Dense, class: Fe
 }
 
 /// The middle of the heights within `band` of `near`: the level of a floor or cap.
-fn level(heights: &[f64], near: f64, band: f64) -> f64 {
-    let mut on: Vec<f64> = heights.iter().copied().filter(|h| (h - near).abs() <= band).collect();
+fn level(heights: &[f64], near: f64, band: f64, room: &Bump) -> f64 {
+    let mut on: List<'_, f64> = heights.iter().copied().filter(|h| (h - near).abs() <= band).collect_in(room);
     if on.is_empty() { near } else { quantile(&mut on, 0.5) }
 }

@@ -2,10 +2,12 @@
 
 use std::f64::consts::TAU;
 
+use bumpalo::Bump;
+use bumpalo::collections::CollectIn;
 use nalgebra::{SMatrix, SVector};
 use tandem_msg::Measured;
 
-use super::quantile;
+use super::{List, quantile};
 
 /// Pitches looked for, in radii of the mean profile.
 const PITCH: [f64; 2] = [0.10, 0.55];
@@ -37,8 +39,8 @@ pub(crate) struct Wound {
 /// exp(i(2πz/p ∓ φ)). What is not wound, rings, an oval, noise, correlates as much with either
 /// hand: only the difference tells of a thread. The best of a range of frequencies is taken and
 /// sharpened by its harmonics.
-pub(crate) fn wound(points: &[[f64; 3]], radius: f64) -> Option<Wound> {
-    let points = detrended(points)?;
+pub(crate) fn wound(points: &[[f64; 3]], radius: f64, room: &Bump) -> Option<Wound> {
+    let points = detrended(points, room)?;
     let power: f64 = points.iter().map(|p| p[2] * p[2]).sum();
     if power <= 0.0 {
         return None;
@@ -96,7 +98,7 @@ pub(crate) fn wound(points: &[[f64; 3]], radius: f64) -> Option<Wound> {
     };
     let heights = points.iter().fold([f64::MAX, f64::MIN], |h, p| [h[0].min(p[0]), h[1].max(p[0])]);
     let width = 0.5 / (heights[1] - heights[0]).max(1e-9) / FINE as f64;
-    let scores: Vec<f64> = (0..=2 * FINE).map(|k| explained(frequency + width * (k as f64 - FINE as f64))).collect();
+    let scores: [f64; 2 * FINE + 1] = std::array::from_fn(|k| explained(frequency + width * (k as f64 - FINE as f64)));
     let k = (0..=2 * FINE).max_by(|&a, &b| scores[a].total_cmp(&scores[b]).then(b.cmp(&a))).unwrap_or(FINE);
     let mut shift = k as f64 - FINE as f64;
     if k > 0 && k < 2 * FINE {
@@ -115,10 +117,10 @@ pub(crate) fn wound(points: &[[f64; 3]], radius: f64) -> Option<Wound> {
 
 /// The points without strays and without what is smooth about the wall: its slope and bend along the axis,
 /// and that its section is displaced or oval.
-fn detrended(points: &[[f64; 3]]) -> Option<Vec<[f64; 3]>> {
-    let mut sizes: Vec<f64> = points.iter().map(|p| p[2].abs()).collect();
+fn detrended<'r>(points: &[[f64; 3]], room: &'r Bump) -> Option<List<'r, [f64; 3]>> {
+    let mut sizes: List<'_, f64> = points.iter().map(|p| p[2].abs()).collect_in(room);
     let limit = 4.0 * quantile(&mut sizes, 0.5);
-    let mut kept: Vec<[f64; 3]> = points.iter().copied().filter(|p| p[2].abs() <= limit).collect();
+    let mut kept: List<'_, [f64; 3]> = points.iter().copied().filter(|p| p[2].abs() <= limit).collect_in(room);
     if kept.len() < POINTS_MIN {
         return None;
     }
