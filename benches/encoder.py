@@ -209,7 +209,7 @@ for _ in sys.stdin:
     best = float("inf")
     for _ in range(3):
         began = time.perf_counter()
-        for sample in inputs * 4:
+        for sample in inputs:
             run(sample)
         best = min(best, time.perf_counter() - began)
-    print(best / len(inputs) / 4 * 1e3, flush=True)
+    print(best / len(inputs) * 1e3, flush=True)
