@@ -110,10 +110,10 @@ struct PolicyArgs {
 #[derive(Args)]
 struct EncoderArgs {
     /// Training examples; a tenth as many more for validation, an eighth for the test
-    #[arg(long, default_value_t = 5_000)]
+    #[arg(long, default_value_t = 40_000)]
     samples: usize,
     /// Passes over the examples
-    #[arg(long, default_value_t = 16)]
+    #[arg(long, default_value_t = 18)]
     epochs: usize,
     /// Decides everything that is drawn
     #[arg(long, default_value_t = 1)]

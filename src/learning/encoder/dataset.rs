@@ -76,60 +76,71 @@ pub fn example(
     // One generator a domain, seed and split, one stream an example: no two share numbers.
     let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(4).wrapping_add(split as u64) ^ domain.stream);
     rng.set_stream(index);
+    loop {
+        if let Some(example) = drawn(domain, index, &mut rng, sampler, cloud) {
+            return example;
+        }
+    }
+}
+
+/// One draw of example `index`; `None` when hardly anything of the part came into view.
+pub(super) fn drawn(
+    domain: &Domain,
+    index: u64,
+    rng: &mut ChaCha8Rng,
+    sampler: &mut Sampler,
+    cloud: &mut Vec<[f32; 3]>,
+) -> Option<Example> {
     let class = domain.class(index);
     let (mut on_feature, mut on_body) = (Vec::with_capacity(CLOUD_POINTS), Vec::with_capacity(CLOUD_POINTS));
-    loop {
-        let specimen = Specimen::draw(domain, index, &mut rng);
-        let view: View<'_> = specimen.view();
-        cloud.clear();
-        on_feature.clear();
-        on_body.clear();
-        let points = domain.scanner.map_or(CLOUD_POINTS, |s| rng.random_range(s.points[0]..=s.points[1]));
-        specimen.camera.render(&view, points, &mut rng, |p, m| {
-            cloud.push(p);
-            on_feature.push(m == Material::Feature);
-            on_body.push(m == Material::Body);
-        });
-        if let Some(scanner) = &domain.scanner {
-            let mut read = scanner.draw(specimen.half_width, specimen.focus, &mut rng);
-            let mut kept = 0;
-            for i in 0..cloud.len() {
-                let Some(p) = read(cloud[i], &mut rng) else { continue };
-                (cloud[kept], on_feature[kept], on_body[kept]) = (p, on_feature[i], on_body[i]);
-                kept += 1;
-            }
-            cloud.truncate(kept);
-            on_feature.truncate(kept);
-            on_body.truncate(kept);
+    let specimen = Specimen::draw(domain, index, rng);
+    let view: View<'_> = specimen.view();
+    cloud.clear();
+    let points = domain.scanner.map_or(CLOUD_POINTS, |s| rng.random_range(s.points[0]..=s.points[1]));
+    specimen.camera.render(&view, points, rng, |p, m| {
+        cloud.push(p);
+        on_feature.push(m == Material::Feature);
+        on_body.push(m == Material::Body);
+    });
+    if let Some(scanner) = &domain.scanner {
+        let mut kept = 0;
+        for i in 0..cloud.len() {
+            let read = scanner.read(cloud[i], specimen.half_width, specimen.focus, rng);
+            let Some(p) = read else { continue };
+            (cloud[kept], on_feature[kept], on_body[kept]) = (p, on_feature[i], on_body[i]);
+            kept += 1;
         }
-        let mut sample = Sample::default();
-        if !sampler.sample(cloud, &mut sample) {
-            continue;
-        }
-        let segment: Vec<bool> = sample.source.iter().map(|&i| on_feature[usize::from(i)]).collect();
-        let shown = segment.iter().filter(|s| **s).count();
-        if class != FeatureClass::Other && shown < SHOWN_MIN {
-            continue;
-        }
-        let closer = place(cloud, &sample, &segment, &on_body, &mut rng).and_then(|ball| {
-            let (mut cut, mut sample) = (Cut::default(), Sample::default());
-            cut.fill(cloud, &ball);
-            if !sampler.sample(&cut.points, &mut sample) {
-                return None;
-            }
-            let of = |i: u16| on_feature[usize::from(cut.index[usize::from(i)])];
-            let segment = sample.source.iter().map(|&i| of(i)).collect();
-            Some(Look { sample, segment, class })
-        });
-        return Example {
-            class,
-            look: Look { sample, segment, class },
-            closer,
-            on_feature,
-            feature: specimen.feature,
-            camera_from_feature: specimen.feature_from_camera.inverse(),
-        };
+        cloud.truncate(kept);
+        on_feature.truncate(kept);
+        on_body.truncate(kept);
     }
+    let mut sample = Sample::default();
+    if !sampler.sample(cloud, &mut sample) {
+        return None;
+    }
+    let segment: Vec<bool> = sample.source.iter().map(|&i| on_feature[usize::from(i)]).collect();
+    let shown = segment.iter().filter(|s| **s).count();
+    if class != FeatureClass::Other && shown < SHOWN_MIN {
+        return None;
+    }
+    let closer = place(cloud, &sample, &segment, &on_body, rng).and_then(|ball| {
+        let (mut cut, mut sample) = (Cut::default(), Sample::default());
+        cut.fill(cloud, &ball);
+        if !sampler.sample(&cut.points, &mut sample) {
+            return None;
+        }
+        let of = |i: u16| on_feature[usize::from(cut.index[usize::from(i)])];
+        let segment = sample.source.iter().map(|&i| of(i)).collect();
+        Some(Look { sample, segment, class })
+    });
+    Some(Example {
+        class,
+        look: Look { sample, segment, class },
+        closer,
+        on_feature,
+        feature: specimen.feature,
+        camera_from_feature: specimen.feature_from_camera.inverse(),
+    })
 }
 
 /// Where a first look might see the feature: about where it is, or, where there is none, anywhere on the part.

@@ -3,123 +3,51 @@
 //! The source domain draws every part anew, from ranges wider than any product's. A product
 //! has a few part types of its own, each of which comes in other sizes, and a scanner of its own.
 
-use nalgebra::{Isometry3, Translation3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use tandem_config::{Body, FeatureGeometry, Product};
+use tandem_config::Product;
 use tandem_msg::{CLOUD_POINTS, Coded, FeatureClass};
 
-use super::specimen::log_uniform;
-use crate::plant::camera::extent;
-use crate::plant::solid::{Form, Other};
+use super::dataset::drawn;
+use super::part::{Kind, log_uniform};
+use crate::perception::Sampler;
 
-/// A part type.
-#[derive(Clone, Debug)]
-pub struct Kind {
-    /// Its feature.
-    pub feature: FeatureGeometry,
-    /// What the feature's dimensions leave open.
-    pub form: Form,
-    /// What it is on.
-    pub body: Body,
-    /// Where on it.
-    pub part_from_feature: Isometry3<f64>,
-    /// Extent of the feature as the camera frames it, metres.
-    pub size: f64,
-}
-
-impl Kind {
-    /// The same in another size.
-    #[must_use]
-    pub fn scaled(&self, by: f64) -> Self {
-        let f = &self.feature;
-        let feature = FeatureGeometry {
-            diameter: f.diameter * by,
-            depth: f.depth * by,
-            length: f.length * by,
-            width: f.width * by,
-            pitch: f.pitch * by,
-            chamfer: f.chamfer * by,
-            ..*f
-        };
-        let other = match self.form.other {
-            Other::Bare => Other::Bare,
-            Other::Block(extents, rounding) => Other::Block(extents.map(|v| v * by), rounding * by),
-            Other::Dome(diameter, height) => Other::Dome(diameter * by, height * by),
-        };
-        let body = match self.body {
-            Body::Box { size } => Body::Box { size: size.map(|v| v * by) },
-            Body::Tray { size, wall, floor } => {
-                Body::Tray { size: size.map(|v| v * by), wall: wall * by, floor: floor * by }
-            }
-            Body::Ring { outer, inner, height } => {
-                Body::Ring { outer: outer.map(|v| v * by), inner: inner.map(|v| v * by), height: height * by }
-            }
-            Body::Cylinder { radius, height } => Body::Cylinder { radius: radius * by, height: height * by },
-            Body::Cable { length, radius } => Body::Cable { length: length * by, radius: radius * by },
-        };
-        let place = Translation3::from(self.part_from_feature.translation.vector * by);
-        Self {
-            feature,
-            form: Form { other, ..self.form },
-            body,
-            part_from_feature: Isometry3::from_parts(place, self.part_from_feature.rotation),
-            size: self.size * by,
-        }
-    }
-
-    fn of(part: &tandem_config::Part) -> Self {
-        Self {
-            feature: part.feature,
-            form: Form::of(&part.feature),
-            body: part.body,
-            part_from_feature: part.part_from_feature,
-            size: extent(&part.feature),
-        }
-    }
-}
-
-/// What a scanner does to a cloud beyond noise. Lengths in half widths of the view.
+/// What one scanner does to a cloud beyond noise, always the same. Lengths in half widths of the view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scanner {
     /// Fewest and most points of a scan.
     pub points: [usize; 2],
-    /// Coarsest step of the range it reads.
+    /// Step of the range it reads.
     pub step: f64,
-    /// Largest bending of the range towards the edge of the view.
+    /// Bending of the range towards the edge of the view, away from the camera if positive.
     pub bowl: f64,
-    /// Largest share of points that is missing at the darker side of the view.
+    /// Share of points that is missing, larger towards the darker side of the view.
     pub shade: f64,
+    /// Direction of the darker side in the view, radians.
+    pub dark: f64,
 }
 
 impl Scanner {
-    /// One scanner of these ranges: takes a place in the camera frame, answers what is read out of it,
-    /// if anything.
-    pub(crate) fn draw(
-        &self,
-        half_width: f64,
-        focus: f64,
-        rng: &mut ChaCha8Rng,
-    ) -> impl FnMut([f32; 3], &mut ChaCha8Rng) -> Option<[f32; 3]> + use<> {
-        let step = (half_width * self.step * rng.random::<f64>()).max(1e-9) as f32;
-        let bowl = (half_width * self.bowl * rng.random_range(-1.0..=1.0)) as f32;
-        let shade = (self.shade * rng.random::<f64>()) as f32;
-        let turn = rng.random_range(0.0..std::f32::consts::TAU);
-        let toward = [turn.cos(), turn.sin()];
+    /// A place in the camera frame as it is read, if it is; `focus` and `half_width` of the view, metres.
+    pub(crate) fn read(&self, p: [f32; 3], half_width: f64, focus: f64, rng: &mut ChaCha8Rng) -> Option<[f32; 3]> {
+        let (step, bowl) = ((half_width * self.step).max(1e-9) as f32, (half_width * self.bowl) as f32);
         let across = (focus / half_width) as f32;
-        move |p, rng| {
-            // Place in the view, -1 to 1.
-            let [x, y] = [p[0] / p[2] * across, p[1] / p[2] * across];
-            let dark = 0.5 + 0.35 * (x * toward[0] + y * toward[1]);
-            if rng.random::<f32>() < shade * dark {
-                return None;
-            }
-            let depth = p[2] + bowl * (0.5 * (x * x + y * y) - 0.33);
-            let depth = (depth / step).round() * step;
-            Some(p.map(|v| v * depth / p[2]))
+        // Place in the view, -1 to 1.
+        let [x, y] = [p[0] / p[2] * across, p[1] / p[2] * across];
+        let (sin, cos) = (self.dark as f32).sin_cos();
+        let dark = 0.5 + 0.35 * (x * cos + y * sin);
+        if rng.random::<f32>() < self.shade as f32 * dark {
+            return None;
         }
+        let depth = p[2] + bowl * (0.5 * (x * x + y * y) - 0.33);
+        let depth = (depth / step).round() * step;
+        Some(p.map(|v| v * depth / p[2]))
     }
 }
+
+/// Part types of a shift that is made up, and how often each is looked at before it is taken.
+const MADE_UP: usize = 11;
+const GLANCES: usize = 5;
 
 /// The ranges of a domain.
 #[derive(Clone, Debug)]
@@ -181,13 +109,13 @@ impl Domain {
             tilt: [0.35, 1.05],
             view: [1.5, 3.2],
             aim: 0.35,
-            noise: [0.001, 0.013],
+            noise: [0.001, 0.010],
             noise_limits: [20e-6, 500e-6],
             dropout: 0.2,
             outliers: 0.03,
             tidy: 0.1,
             clutter: 7,
-            scanner: Some(Scanner { points: [3_000, 8_000], step: 0.03, bowl: 0.15, shade: 0.9 }),
+            scanner: Some(Scanner { points: [3_000, 8_000], step: 0.012, bowl: 0.15, shade: 0.6, dark: 0.0 }),
             stream: 0x5472_0000,
         }
     }
@@ -195,23 +123,17 @@ impl Domain {
     /// A shift of the source that is made up: eleven part types of the generator's, some scanner.
     /// What agents of transfer learn on, since its labels cost nothing.
     pub fn made_up(rng: &mut ChaCha8Rng) -> Self {
-        let classes = FeatureClass::ALL;
-        let kinds = (0..11)
-            .map(|i| {
-                let class = if i < classes.len() { classes[i] } else { classes[rng.random_range(0..classes.len())] };
-                super::specimen::kind(class, rng)
-            })
-            .collect();
         let noise = log_uniform([0.004, 0.013], rng);
         let view = rng.random_range(1.2..1.8);
         let scanner = Scanner {
             points: [rng.random_range(2_500..8_000), CLOUD_POINTS],
-            step: rng.random_range(0.0..0.03),
-            bowl: rng.random_range(0.0..0.2),
-            shade: rng.random_range(0.0..1.0),
+            step: rng.random_range(0.0..0.02),
+            bowl: rng.random_range(-0.2..0.2),
+            shade: rng.random_range(0.0..0.9),
+            dark: rng.random_range(0.0..std::f64::consts::TAU),
         };
-        Self {
-            kinds,
+        let mut out = Self {
+            kinds: Vec::new(),
             scale: [0.75, 1.35],
             tilt: [rng.random_range(0.2..0.5), rng.random_range(0.7..1.0)],
             view: [view, view + rng.random_range(0.4..1.5)],
@@ -224,7 +146,26 @@ impl Domain {
             clutter: rng.random_range(3..7),
             scanner: Some(scanner),
             stream: rng.random(),
+        };
+        let mut kinds = Vec::with_capacity(MADE_UP);
+        while kinds.len() < MADE_UP {
+            let class = match FeatureClass::ALL.get(kinds.len()) {
+                Some(class) => *class,
+                None => FeatureClass::ALL[rng.random_range(0..FeatureClass::ALL.len())],
+            };
+            out.kinds = vec![Kind::draw(class, rng)];
+            if out.shows(rng) {
+                kinds.append(&mut out.kinds);
+            }
         }
+        Self { kinds, ..out }
+    }
+
+    /// Whether its first part type can mostly be seen: of a slot too narrow this scanner sees nothing.
+    fn shows(&self, rng: &mut ChaCha8Rng) -> bool {
+        let (mut sampler, mut cloud) = (Sampler::new(), Vec::new());
+        let seen = (0..GLANCES).filter(|_| drawn(self, 0, rng, &mut sampler, &mut cloud).is_some());
+        2 * seen.count() > GLANCES
     }
 
     /// Class of an example: classes or part types follow each other in turn.

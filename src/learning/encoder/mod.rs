@@ -9,13 +9,15 @@ pub(crate) mod augment;
 pub(crate) mod dataset;
 mod domain;
 pub(crate) mod parameters;
+mod part;
 pub(crate) mod pass;
 pub(crate) mod report;
 mod specimen;
 pub(crate) mod train;
 
 pub use dataset::{Example, Look, Split, example};
-pub use domain::{Domain, Kind, Scanner};
+pub use domain::{Domain, Scanner};
+pub use part::Kind;
 pub use report::measure;
 pub use specimen::Specimen;
 pub use train::{TrainError, TrainOptions, TrainProgress, train};

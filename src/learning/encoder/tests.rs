@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use candle_core::{D, Device, Tensor};
 use nalgebra::{Isometry3, Vector3};
-use rand::SeedableRng;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use tandem_config::{Body, FeatureGeometry};
 use tandem_msg::{Coded, FEATURE_CLASSES, Feature, FeatureClass, Header, PointCloud, Pose, Recognition, Stamp};
@@ -13,6 +13,7 @@ use tandem_msg::{Coded, FEATURE_CLASSES, Feature, FeatureClass, Header, PointClo
 use super::dataset::{Example, Look, Split, example};
 use super::domain::Domain;
 use super::parameters::Parameters;
+use super::part::Kind;
 use super::pass::{Pass, SEGMENT, SEGMENT_STRIDE, SMOOTHING};
 use super::train::{Run, TrainOptions, train};
 use crate::perception::network::{CLASS_HIDDEN, Input, Network, Output};
@@ -152,6 +153,31 @@ fn examples_repeat_and_show_their_feature() {
         assert_ne!(a.look, c.look, "splits are disjoint");
         let shown = a.look.segment.iter().filter(|s| **s).count();
         assert!(a.class == FeatureClass::Other || shown >= 24, "{}: {shown} points", a.class);
+    }
+}
+
+/// In whatever form a feature is drawn, sphere tracing never steps through it: no point within the distance of
+/// another lies inside; and every form has a surface of its own.
+#[test]
+fn generated_parts_have_distances_that_are_lower_bounds() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for number in 0..400 {
+        let class = FeatureClass::ALL[number % FEATURE_CLASSES];
+        let kind = Kind::draw(class, &mut rng);
+        let solid = Solid::with_form(&kind.body, &kind.feature, &kind.form, &kind.part_from_feature);
+        let size = kind.size as f32;
+        for _ in 0..1000 {
+            let a: [f32; 3] = [0; 3].map(|_| size * rng.random_range(-1.2..1.2));
+            let d = solid.distance(a);
+            let way: [f32; 3] = [0; 3].map(|_| rng.random_range(-1.0..1.0));
+            let length = way.iter().map(|s| s * s).sum::<f32>().sqrt();
+            if d <= 0.0 || !(0.1..=1.0).contains(&length) {
+                continue;
+            }
+            let b = [0, 1, 2].map(|i| a[i] + way[i] / length * d * 0.999);
+            let inside = solid.distance(b);
+            assert!(inside > -4e-3 * size, "{kind:?}: {d} at {a:?}, but {inside} at {b:?}");
+        }
     }
 }
 

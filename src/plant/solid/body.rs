@@ -21,20 +21,21 @@ enum Shape {
     Tray([f32; 3], f32, f32),
     /// Half extents outer and inner, half height.
     Ring([f32; 2], [f32; 2], f32),
-    /// Radius, half height.
-    Cylinder(f32, f32),
+    /// Radius, half height, sides of a prism about it.
+    Cylinder(f32, f32, u8),
     /// Half length of the centre line, radius.
     Cable(f32, f32),
 }
 
 impl BodySolid {
-    pub(crate) fn new(body: &Body, part_from_feature: &Isometry3<f64>) -> Self {
+    /// `sides` makes a prism of a cylinder.
+    pub(crate) fn new(body: &Body, sides: u8, part_from_feature: &Isometry3<f64>) -> Self {
         let half = |v: f64| (0.5 * v) as f32;
         let shape = match body {
             Body::Box { size } => Shape::Box(size.map(half)),
             Body::Tray { size, wall, floor } => Shape::Tray(size.map(half), *wall as f32, *floor as f32),
             Body::Ring { outer, inner, height } => Shape::Ring(outer.map(half), inner.map(half), half(*height)),
-            Body::Cylinder { radius, height } => Shape::Cylinder(*radius as f32, half(*height)),
+            Body::Cylinder { radius, height } => Shape::Cylinder(*radius as f32, half(*height), sides),
             Body::Cable { length, radius } => Shape::Cable(half(*length - 2.0 * radius), *radius as f32),
         };
         let matrix = part_from_feature.rotation.to_rotation_matrix();
@@ -65,7 +66,7 @@ impl BodySolid {
                 let past = (y.abs() - run).max(0.0);
                 (x * x + past * past + z * z).sqrt() - radius
             }
-            Shape::Cylinder(radius, height) => extrude((x * x + y * y).sqrt() - radius, z.abs() - height),
+            Shape::Cylinder(radius, height, sides) => extrude(prism([x, y], *radius, *sides), z.abs() - height),
         }
     }
 }
@@ -86,6 +87,19 @@ pub(crate) fn cuboid(p: [f32; 3], half: [f32; 3]) -> f32 {
 #[inline]
 pub(crate) fn rectangle(p: [f32; 2], half: [f32; 2]) -> f32 {
     extrude(p[0].abs() - half[0], p[1].abs() - half[1])
+}
+
+/// Lower bound of the distance to a regular polygon about the origin, flat towards +x, with this radius of the
+/// circle inside it; to the circle itself without sides.
+#[inline]
+pub(crate) fn prism([x, y]: [f32; 2], radius: f32, sides: u8) -> f32 {
+    let rho = (x * x + y * y).sqrt();
+    if sides == 0 {
+        return rho - radius;
+    }
+    let sector = core::f32::consts::TAU / f32::from(sides);
+    let angle = y.atan2(x);
+    rho * (angle - sector * (angle / sector).round()).cos() - radius
 }
 
 /// Joins a distance in a plane and one along its normal into that of the prism.

@@ -4,44 +4,18 @@ use tandem_config::FeatureGeometry;
 use tandem_msg::FeatureClass;
 
 use super::Material;
-use super::body::{cuboid, extrude};
+use super::body::{cuboid, extrude, prism};
+use super::form::{Form, Hook, Other, Recess, Section};
 use super::thread::Thread;
 
 /// 1/√2: the slope of a chamfer.
 const DIAGONAL: f32 = core::f32::consts::FRAC_1_SQRT_2;
 
+/// What a drill of 118° leaves: rise of the bottom towards the wall a metre, cosine of that slope.
+const DRILL: [f32; 2] = [0.6, 0.857];
+
 /// How far a feature that stands on the body reaches into it, metres.
 const ROOT: f32 = 1e-4;
-
-/// What the dimensions leave open.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Form {
-    /// A cone is a seat sunk into the part, not a pin.
-    pub seat: bool,
-    /// A buckle is two hooks that face away from each other.
-    pub twin: bool,
-    /// What stands on the surface when there is no feature of another class.
-    pub other: Other,
-}
-
-impl Form {
-    /// The form a feature of a product has.
-    pub fn of(geometry: &FeatureGeometry) -> Self {
-        Self { twin: geometry.length > 0.8 * geometry.depth, ..Self::default() }
-    }
-}
-
-/// Forms of [`FeatureClass::Other`].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Other {
-    /// The bare surface.
-    #[default]
-    Bare,
-    /// A rib or boss: extents along x, y, z and rounding of its edges, metres.
-    Block([f64; 3], f64),
-    /// The cap of a ball: diameter and height, metres.
-    Dome(f64, f64),
-}
 
 /// A feature in its own frame.
 #[derive(Clone, Debug)]
@@ -60,18 +34,25 @@ enum Shape {
         depth: f32,
         chamfer: f32,
         thread: Option<Thread>,
+        /// Rise of the bottom towards the wall a metre, and the cosine of that slope.
+        tip: [f32; 2],
+        /// Radius and depth.
+        counterbore: [f32; 2],
     },
     Axis {
         radius: f32,
         height: f32,
         chamfer: f32,
         thread: Option<Thread>,
+        recess: Option<Recess>,
     },
     Slot {
         half_run: f32,
         radius: f32,
         depth: f32,
         chamfer: f32,
+        section: Section,
+        square: bool,
     },
     /// Frustum: radius at z = 0, change of radius a metre of z, end of it, cosine of the half angle.
     Cone {
@@ -79,12 +60,15 @@ enum Shape {
         slope: f32,
         end: f32,
         cosine: f32,
+        /// Radius of the bore below a seat.
+        bore: f32,
     },
-    /// Hook profile in the plane (x, z), half width along y, half gap between two facing away, or none.
+    /// Hook profile in the plane (x, z), half width along y; of two hooks where the profile begins from the
+    /// middle, and the direction in which it runs.
     Buckle {
         profile: [[f32; 2]; 7],
         half_width: f32,
-        half_gap: Option<f32>,
+        pair: Option<[f32; 2]>,
         reach: f32,
     },
     /// Box with rounded edges, standing on the surface.
@@ -97,6 +81,27 @@ enum Shape {
         radius: f32,
         centre: f32,
     },
+    Prism {
+        radius: f32,
+        height: f32,
+        sides: u8,
+    },
+    /// Half length along x, height, half width along y.
+    Wedge {
+        half: f32,
+        height: f32,
+        half_width: f32,
+    },
+    Torus {
+        radius: f32,
+        thickness: f32,
+    },
+    /// Ribs every so far along x, the outermost so far from the middle.
+    Ribs {
+        half: [f32; 3],
+        every: f32,
+        last: f32,
+    },
 }
 
 impl FeatureSolid {
@@ -106,26 +111,29 @@ impl FeatureSolid {
         let f = |v: f64| v as f32;
         let (radius, depth, chamfer, pitch) = (f(0.5 * g.diameter), f(g.depth), f(g.chamfer), f(g.pitch));
         let (shape, sunk) = match g.class {
-            FeatureClass::ThreadedHole => {
-                (Shape::Hole { radius, depth, chamfer, thread: Some(Thread::internal(radius, pitch)) }, true)
+            FeatureClass::ThreadedHole | FeatureClass::SmoothHole => {
+                let thread = (g.class == FeatureClass::ThreadedHole).then(|| Thread::internal(radius, pitch));
+                let tip = if form.drilled { DRILL } else { [0.0, 1.0] };
+                let counterbore = [f(0.5 * form.counterbore[0]), f(form.counterbore[1])];
+                (Shape::Hole { radius, depth, chamfer, thread, tip, counterbore }, true)
             }
-            FeatureClass::SmoothHole => (Shape::Hole { radius, depth, chamfer, thread: None }, true),
-            FeatureClass::ThreadedAxis => {
-                let thread = Some(Thread::external(radius, pitch));
-                (Shape::Axis { radius, height: depth, chamfer, thread }, false)
+            FeatureClass::ThreadedAxis | FeatureClass::SmoothAxis => {
+                let thread = (g.class == FeatureClass::ThreadedAxis).then(|| Thread::external(radius, pitch));
+                (Shape::Axis { radius, height: depth, chamfer, thread, recess: form.recess }, false)
             }
-            FeatureClass::SmoothAxis => (Shape::Axis { radius, height: depth, chamfer, thread: None }, false),
             FeatureClass::Slot => {
                 let radius = f(0.5 * g.width);
-                (Shape::Slot { half_run: (f(0.5 * g.length) - radius).max(0.0), radius, depth, chamfer }, true)
+                let half_run = f(if form.open { g.length } else { 0.5 * g.length });
+                let half_run = (half_run - radius).max(0.0);
+                (Shape::Slot { half_run, radius, depth, chamfer, section: form.section, square: form.square }, true)
             }
             FeatureClass::Cone => {
                 // Either narrows away from the surface.
                 let (slope, end) = (f(g.angle.tan()), depth);
                 let (slope, end) = if form.seat { (slope, -end) } else { (-slope, end) };
-                (Shape::Cone { radius, slope, end, cosine: f(g.angle.cos()) }, form.seat)
+                (Shape::Cone { radius, slope, end, cosine: f(g.angle.cos()), bore: f(0.5 * form.bore) }, form.seat)
             }
-            FeatureClass::Buckle => (buckle(g, form.twin), false),
+            FeatureClass::Buckle => (buckle(g, form.hook), false),
             FeatureClass::Other => match form.other {
                 Other::Bare => (Shape::None, false),
                 Other::Block([x, y, z], rounding) => {
@@ -135,6 +143,22 @@ impl FeatureSolid {
                     let (radius, height) = (0.5 * diameter, height.min(0.5 * diameter));
                     let sphere = (radius * radius + height * height) / (2.0 * height.max(1e-6));
                     (Shape::Dome { radius: f(sphere), centre: f(height - sphere) }, false)
+                }
+                Other::Prism { across, height, sides } => {
+                    (Shape::Prism { radius: f(0.5 * across), height: f(height), sides }, false)
+                }
+                Other::Wedge([x, y, z]) => {
+                    (Shape::Wedge { half: f(0.5 * x), height: f(z), half_width: f(0.5 * y) }, false)
+                }
+                Other::Torus(diameter, thickness) => {
+                    (Shape::Torus { radius: f(0.5 * diameter), thickness: f(0.5 * thickness) }, false)
+                }
+                Other::Ribs { extents: [x, y, z], count } => {
+                    // As much gap as rib.
+                    let count = f32::from(count.max(2));
+                    let rib = f(x) / (2.0 * count - 1.0);
+                    let half = [0.5 * rib, f(0.5 * y), f(z)];
+                    (Shape::Ribs { half, every: 2.0 * rib, last: 0.5 * (count - 1.0) }, false)
                 }
             },
         };
@@ -159,40 +183,62 @@ impl FeatureSolid {
         let [x, y, z] = p;
         match &self.shape {
             Shape::None => f32::INFINITY,
-            Shape::Hole { radius, depth, chamfer, thread } => {
+            Shape::Hole { radius, depth, chamfer, thread, tip: [rise, cosine], counterbore } => {
                 let rho = (x * x + y * y).sqrt();
                 let bore = thread.as_ref().map_or(rho - radius, |t| t.bore(x, y, z, rho));
-                countersunk(bore.max(-depth - z), rho - radius, z, *chamfer)
+                let bottom = (-depth - z - rise * (radius - rho).max(0.0)) * cosine;
+                let cut = countersunk(bore.max(bottom), rho - radius, z, *chamfer);
+                cut.min((rho - counterbore[0]).max(-counterbore[1] - z))
             }
-            Shape::Axis { radius, height, chamfer, thread } => {
+            Shape::Axis { radius, height, chamfer, thread, recess } => {
                 let rho = (x * x + y * y).sqrt();
                 let rod = thread.as_ref().map_or(rho - radius, |t| t.rod(x, y, z, rho));
                 let bevel = (rho - radius + z - height + chamfer) * DIAGONAL;
                 // The profile above the end is none: its distance must not be added to the height.
                 let end = z - height;
                 let trunk = if thread.is_some() { rod.max(end) } else { extrude(rod, end) };
-                trunk.max(bevel).max(-z - ROOT)
+                let whole = trunk.max(bevel).max(-z - ROOT);
+                recess.as_ref().map_or(whole, |r| {
+                    let wall = prism([x, y], 0.5 * r.across as f32, r.sides);
+                    whole.max(-wall.max(height - r.depth as f32 - z))
+                })
             }
-            Shape::Slot { half_run, radius, depth, chamfer } => {
+            Shape::Slot { half_run, radius, depth, chamfer, section, square } => {
                 let along = (x.abs() - half_run).max(0.0);
-                let wall = (along * along + y * y).sqrt() - radius;
-                countersunk(wall.max(-depth - z), wall, z, *chamfer)
+                let end = x.abs() - half_run - radius;
+                let wall = if *square { end.max(y.abs() - radius) } else { (along * along + y * y).sqrt() - radius };
+                let cut = match section {
+                    Section::Plain => wall.max(-depth - z),
+                    Section::Tee(neck, foot) => {
+                        let below = (y.abs() - radius * *foot as f32).max(end).max(z + depth * *neck as f32);
+                        wall.min(below).max(-depth - z)
+                    }
+                    Section::Dovetail(slope) => {
+                        let slope = *slope as f32;
+                        let wall = (y.abs() - radius + slope * z.min(0.0)) / (1.0 + slope * slope).sqrt();
+                        wall.max(end).max(-depth - z)
+                    }
+                };
+                countersunk(cut, wall, z, *chamfer)
             }
-            Shape::Cone { radius, slope, end, cosine } => {
+            Shape::Cone { radius, slope, end, cosine, bore } => {
                 let rho = (x * x + y * y).sqrt();
                 let flank = (rho - radius - slope * z) * cosine;
                 // A pin ends above, a seat below.
-                if *end > 0.0 { flank.max(z - end).max(-z - ROOT) } else { flank.max(end - z) }
+                if *end > 0.0 {
+                    flank.max(z - end).max(-z - ROOT)
+                } else {
+                    let cut = flank.max(end - z);
+                    if *bore > 0.0 { cut.min(rho - bore) } else { cut }
+                }
             }
-            Shape::Buckle { profile, half_width, half_gap, reach } => {
+            Shape::Buckle { profile, half_width, pair, reach } => {
                 let bound = (x * x + y * y + z * z).sqrt() - reach;
                 if bound > 0.5 * reach {
                     return bound;
                 }
-                let across = match half_gap {
-                    Some(gap) => polygon([x.abs() - gap, z], profile),
-                    None => polygon([x, z], profile),
-                };
+                let along = pair.map_or(x, |[from, way]| way * (x.abs() - from));
+                let across = polygon([along, z], profile);
                 extrude(across, y.abs() - half_width)
             }
             Shape::Block { half, rounding } => {
@@ -202,6 +248,21 @@ impl FeatureSolid {
             Shape::Dome { radius, centre } => {
                 let h = z - centre;
                 ((x * x + y * y + h * h).sqrt() - radius).max(-z - ROOT)
+            }
+            Shape::Wedge { half, height, half_width } => {
+                let flank = (x.abs() * height + z * half - half * height) / (half * half + height * height).sqrt();
+                flank.max(y.abs() - half_width).max(-z - ROOT)
+            }
+            Shape::Torus { radius, thickness } => {
+                let across = (x * x + y * y).sqrt() - radius;
+                let up = z - 0.8 * thickness;
+                (across * across + up * up).sqrt() - thickness
+            }
+            Shape::Prism { radius, height, sides } => prism([x, y], *radius, *sides).max(z - height).max(-z - ROOT),
+            Shape::Ribs { half, every, last } => {
+                // Ribs stand at whole steps from the first.
+                let nearest = ((x / every + last).round().clamp(0.0, 2.0 * last) - last) * every;
+                cuboid([x - nearest, y, z], *half).max(-z - ROOT)
             }
         }
     }
@@ -216,11 +277,13 @@ fn countersunk(cut: f32, wall: f32, z: f32, chamfer: f32) -> f32 {
     cut.min(((wall - chamfer - z) * DIAGONAL).max(-chamfer - z))
 }
 
-/// Snap hooks of height `depth`, `width` along y, `length` along x over all: one, or a pair
-/// whose noses look away from each other.
-fn buckle(g: &FeatureGeometry, twin: bool) -> Shape {
+/// Snap hooks of height `depth`, `width` along y, `length` along x over all.
+fn buckle(g: &FeatureGeometry, hook: Hook) -> Shape {
     let (height, length) = (g.depth as f32, g.length as f32);
-    let each = if twin { 0.36 * length } else { length };
+    let each = match hook {
+        Hook::Single => length,
+        Hook::Pair { gap, .. } => (0.5 - gap as f32) * length,
+    };
     let (thick, overhang) = (0.55 * each, 0.45 * each);
     let nose = (0.4 * height).min(2.0 * overhang);
     // Counter-clockwise from the foot; the nose looks towards +x.
@@ -234,12 +297,16 @@ fn buckle(g: &FeatureGeometry, twin: bool) -> Shape {
         [0.0, height],
     ];
     let half_width = 0.5 * g.width as f32;
-    let half_gap = twin.then_some(0.5 * length - each);
     // A single hook stands about the origin.
-    let shift = if twin { 0.0 } else { -0.5 * length };
+    let shift = if hook == Hook::Single { -0.5 * length } else { 0.0 };
     let profile = profile.map(|[x, z]| [x + shift, z]);
+    let pair = match hook {
+        Hook::Single => None,
+        Hook::Pair { inward: false, .. } => Some([0.5 * length - each, 1.0]),
+        Hook::Pair { inward: true, .. } => Some([0.5 * length, -1.0]),
+    };
     let reach = (0.25 * length * length + height * height + half_width * half_width).sqrt();
-    Shape::Buckle { profile, half_width, half_gap, reach }
+    Shape::Buckle { profile, half_width, pair, reach }
 }
 
 /// Signed distance to a simple polygon.

@@ -11,10 +11,12 @@
 
 mod body;
 mod feature;
+mod form;
 mod surroundings;
 mod thread;
 
-pub use feature::{FeatureSolid, Form, Other};
+pub use feature::FeatureSolid;
+pub use form::{Form, Hook, Other, Recess, Section};
 pub use surroundings::{Clutter, Surroundings};
 
 use nalgebra::Isometry3;
@@ -50,7 +52,7 @@ impl Solid {
     /// The same with what the dimensions leave open.
     pub fn with_form(body: &Body, feature: &FeatureGeometry, form: &Form, part_from_feature: &Isometry3<f64>) -> Self {
         Self {
-            body: BodySolid::new(body, part_from_feature),
+            body: BodySolid::new(body, form.sides, part_from_feature),
             feature: FeatureSolid::new(feature, form),
             part_from_feature: *part_from_feature,
         }
