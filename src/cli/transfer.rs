@@ -79,7 +79,7 @@ fn labels(text: &str) -> Result<usize, String> {
 #[derive(Args)]
 pub(super) struct AgentArgs {
     /// Shifts of the source that are made up for it
-    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u64).range(1..=10_000))]
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u64).range(1..=10_000))]
     episodes: u64,
     /// Decides everything that is drawn
     #[arg(long, default_value_t = 1)]
@@ -178,11 +178,11 @@ fn try_agent(args: &AgentArgs) -> Result<(), String> {
         if args.json {
             anstream::println!(
                 "{}",
-                json!({"event": "episode", "episode": episode, "similarity_before": first, "similarity_after": last, "loss": loss})
+                json!({"event": "episode", "episode": episode, "before": first, "after": last, "loss": loss})
             );
         } else {
             let line =
-                format!("episode {episode}: similarity {first:.3} to {last:.3} (looks held back), loss {loss:.4}");
+                format!("episode {episode}: {first:.3} to {last:.3} of about 2 (looks held back), loss {loss:.4}");
             if bar.is_hidden() { anstream::eprintln!("{line}") } else { bar.println(line) }
         }
     };

@@ -6,7 +6,7 @@ use tandem_msg::{Coded, FEATURE_CLASSES};
 
 use super::agent::{Agent, Memory};
 use super::discrepancy::discrepancy;
-use super::moves::{MOVES, Move, SIGNS, STEPS, Sign, Spread};
+use super::moves::{Group, MOVES, Move, SIGNS, STEPS, Sign, Spread};
 use super::protocol::{COST, SHARD, Settings};
 use super::rivals::{REFRESH, classes};
 use super::similarity::Prototypes;
@@ -27,6 +27,8 @@ const BANK: usize = 48;
 const SURE: f32 = 0.9;
 /// Momentum of the signs.
 const MOMENTUM: f32 = 0.9;
+/// What is kept of the running mean of the weights at each offset: it spans some two moves.
+const AVERAGED: f32 = 0.94;
 /// Moves the greedy player tries at a time.
 const TRIED: usize = 4;
 
@@ -67,8 +69,12 @@ pub(crate) struct Episode<'a> {
     sets: Sets<'a>,
     /// Examples whose labels only the reward knows; none at the real target.
     held: &'a [Example],
+    /// Of the source, all labelled: keeps the encoder one the frozen decoders can read.
+    source: &'a [Example],
     spread: Spread,
     momentum: Vec<f32>,
+    /// Running mean of the weights.
+    average: Vec<f32>,
     settings: Settings,
     rng: ChaCha8Rng,
     spent: usize,
@@ -78,7 +84,7 @@ pub(crate) struct Episode<'a> {
     /// What the last move gained, and the last of each kind of sign.
     gained: f32,
     gains: [f32; SIGNS.len()],
-    /// Δ_F of the examples held back.
+    /// Δ_F of the examples held back and the mean probability of their own classes.
     truth: f32,
 }
 
@@ -86,7 +92,7 @@ impl<'a> Episode<'a> {
     /// Begins with the statistics of the target, as every method ends with them.
     pub(crate) fn begin(
         mut student: Student,
-        bank: &'a Bank,
+        (bank, source): (&'a Bank, &'a [Example]),
         sets: Sets<'a>,
         held: &'a [Example],
         settings: Settings,
@@ -97,9 +103,11 @@ impl<'a> Episode<'a> {
         let mut out = Self {
             spread: Spread::new(&student.run.spans[0]),
             momentum: vec![0.0; student.run.parameters.len()],
+            average: student.run.parameters.clone(),
             best: (f32::MIN, student.snapshot()),
             student,
             bank,
+            source,
             sets,
             held,
             settings,
@@ -163,7 +171,8 @@ impl<'a> Episode<'a> {
     //
     // Eq. (8): R = mΔ_F + C with C = −m times the Δ_F before, so that a move is worth what it changes.
     // While the agent learns, on shifts that were made up, Δ_F is that of labelled looks the moves never
-    // see: it learns what carries over, not what fits the few labels.
+    // see, and what Δ_F stands for is added, the probability the decoder gives their own classes: the agent
+    // learns what carries over, not what fits the few labels.
     pub(crate) fn make(&mut self, action: usize) -> Result<f32, TrainError> {
         let (before, truth) = (self.now.similarity, self.truth);
         let made = Move::of(action);
@@ -175,14 +184,21 @@ impl<'a> Episode<'a> {
             }
             Move::Undo => {
                 self.student.restore(&self.best.1);
+                self.average.clone_from(&self.student.run.parameters);
+                self.momentum.fill(0.0);
+            }
+            Move::Average => {
+                // The encoder's only: of what stands still the mean would still round.
+                for span in self.spread.of(Group::All) {
+                    self.student.run.parameters[span.clone()].copy_from_slice(&self.average[span.clone()]);
+                }
                 self.momentum.fill(0.0);
             }
             Move::Step(group, sign, unit) => {
                 for _ in 0..STEPS {
-                    if self.gradient(sign) {
-                        self.offset(group, unit * self.settings.rate);
-                    }
-                    self.spent += COST[1] * SHARD;
+                    self.gradient(sign);
+                    self.offset(group, unit * self.settings.rate);
+                    self.spent += 2 * COST[1] * SHARD;
                 }
             }
         }
@@ -199,28 +215,28 @@ impl<'a> Episode<'a> {
         Ok((REWARD * change).clamp(-2.0, 2.0))
     }
 
-    /// Gradient of what signs are taken from, on new looks, into the pass of the target; false when
-    /// there is nothing to learn from.
-    fn gradient(&mut self, sign: Sign) -> bool {
-        let set = match sign {
-            Sign::Similarity | Sign::Labels => self.sets.labelled,
-            Sign::Discrepancy | Sign::Confident => self.sets.unlabelled,
+    /// Gradient of what signs are taken from, on new looks, into the pass of the target: the labels of the
+    /// source and of the target, the frozen decoders reading both, and what the kind of sign adds.
+    fn gradient(&mut self, sign: Sign) {
+        let few = self.sets.labelled;
+        let labelled = match sign {
+            _ if few.is_empty() => 0,
+            Sign::Similarity | Sign::Labels => SHARD,
+            Sign::Discrepancy | Sign::Confident => SHARD / 2,
         };
-        let looks = batch(set, SHARD, &mut self.rng);
+        let mut looks = batch(few, labelled, &mut self.rng);
+        looks.extend(batch(self.sets.unlabelled, SHARD - labelled, &mut self.rng));
         let phase = self.rng.random_range(0..2);
         self.student.see(1, &looks, phase);
         self.student.follow();
         let pass = &self.student.passes[1];
-        let none = vec![None; SHARD];
+        let mut demand = Demand { classes: classes(&looks), segmented: labelled, ..Demand::default() };
+        // The rest have no labels that may be read.
+        demand.classes[labelled..].fill(None);
+        let mut gradient = Vec::new();
         match sign {
-            Sign::Labels => {
-                let demand = Demand { classes: classes(&looks), segmented: SHARD, ..Demand::default() };
-                self.student.learn(1, &demand);
-            }
-            Sign::Similarity => {
-                let gradient = self.bank.prototypes.pull(pass.features(), &classes(&looks)).1;
-                self.student.learn(1, &Demand { classes: none, features: Some(&gradient), ..Demand::default() });
-            }
+            Sign::Labels => {}
+            Sign::Similarity => gradient = self.bank.prototypes.pull(pass.features(), &demand.classes).1,
             Sign::Discrepancy => {
                 let rows = self.bank.features.len() / FEATURES;
                 let mut ours = Vec::with_capacity(BANK * FEATURES);
@@ -228,23 +244,24 @@ impl<'a> Episode<'a> {
                     let row = self.rng.random_range(0..rows);
                     ours.extend_from_slice(&self.bank.features[row * FEATURES..][..FEATURES]);
                 }
-                let [_, gradient] = discrepancy(&ours, pass.features(), FEATURES).1;
-                self.student.learn(1, &Demand { classes: none, features: Some(&gradient), ..Demand::default() });
+                [_, gradient] = discrepancy(&ours, pass.features(), FEATURES).1;
             }
             Sign::Confident => {
-                let logits = pass.class_logits.chunks_exact(FEATURE_CLASSES);
-                let classes: Vec<Option<usize>> = logits.map(sure_of).collect();
-                if classes.iter().all(Option::is_none) {
-                    return false;
-                }
-                self.student.learn(1, &Demand { classes, ..Demand::default() });
+                let logits = pass.class_logits.chunks_exact(FEATURE_CLASSES).skip(labelled);
+                demand.classes[labelled..].iter_mut().zip(logits).for_each(|(class, logits)| *class = sure_of(logits));
             }
         }
-        true
+        demand.features = (!gradient.is_empty()).then_some(&gradient[..]);
+        self.student.learn(1, &demand);
+        let looks = batch(self.source, SHARD, &mut self.rng);
+        self.student.see(0, &looks, phase);
+        self.student.learn(0, &Demand { classes: classes(&looks), segmented: SHARD, ..Demand::default() });
+        let [ours, theirs] = &mut self.student.passes;
+        theirs.gradient.iter_mut().zip(&ours.gradient).for_each(|(sum, g)| *sum += g);
     }
 
     /// Offsets the weights of a group by `unit` against the signs of the gradient, kept with momentum.
-    fn offset(&mut self, group: super::moves::Group, unit: f32) {
+    fn offset(&mut self, group: Group, unit: f32) {
         let gradient = &self.student.passes[1].gradient;
         let length = gradient.iter().map(|g| g * g).sum::<f32>().sqrt().max(1e-12);
         for (m, g) in self.momentum.iter_mut().zip(gradient) {
@@ -257,6 +274,9 @@ impl<'a> Episode<'a> {
                     *w -= unit * m.signum();
                 }
             }
+        }
+        for (a, w) in self.average.iter_mut().zip(&self.student.run.parameters) {
+            *a = AVERAGED * *a + (1.0 - AVERAGED) * w;
         }
     }
 
@@ -297,7 +317,9 @@ impl<'a> Episode<'a> {
         if !self.held.is_empty() {
             let looks = watched(self.held);
             let labels: Vec<Option<usize>> = looks.iter().map(|look| Some(look.class.code() as usize)).collect();
-            self.truth = mean(&margins(&Answers::of(&mut engine, &looks), &labels));
+            let answers = Answers::of(&mut engine, &looks);
+            let own = answers.probabilities.iter().zip(&labels).map(|(p, l)| l.map_or(0.0, |l| p[l]));
+            self.truth = mean(&margins(&answers, &labels)) + mean(&own.collect::<Vec<_>>());
         }
         Ok(())
     }
@@ -341,16 +363,15 @@ impl<'a> Episode<'a> {
         Ok(())
     }
 
-    /// One move while the agent learns: sometimes its choice, otherwise any; remembered.
-    pub(crate) fn practise(&mut self, agent: &mut Agent, exploration: f64) -> Result<(), TrainError> {
+    /// One move while the agent learns: sometimes its choice, otherwise any.
+    pub(crate) fn practise(&mut self, agent: &Agent, exploration: f64) -> Result<Memory, TrainError> {
         let state = self.state();
         let action = if self.rng.random_bool(exploration) { self.any() } else { agent.choose(&state, &self.allowed()) };
         let reward = self.make(action)?;
-        agent.remember(Memory { state, action, reward, next: self.state(), allowed: self.allowed() });
-        Ok(())
+        Ok(Memory { state, action, reward, next: self.state(), allowed: self.allowed() })
     }
 
-    /// Δ_F of what was held back.
+    /// Δ_F of what was held back, and the mean probability of its own classes: 2 at best, about.
     pub(crate) fn truth(&self) -> f32 {
         self.truth
     }

@@ -17,16 +17,16 @@ pub(crate) enum Group {
     All,
 }
 
-/// Where the signs of a move's offsets come from.
+/// Where the signs of a move's offsets come from: from the labels there are, and from one thing more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sign {
     /// Δ_F of the labelled looks.
     Similarity,
-    /// The labels, through the frozen decoders.
+    /// Nothing more.
     Labels,
-    /// The discrepancy of unlabelled looks from the source.
+    /// The discrepancy of the looks from the source.
     Discrepancy,
-    /// What the frozen decoder is sure of among the unlabelled looks.
+    /// What the frozen decoder is sure of among unlabelled looks.
     Confident,
 }
 
@@ -46,17 +46,21 @@ pub(crate) enum Move {
     Refresh,
     /// Goes back to where Δ_F was best.
     Undo,
+    /// Goes to the running mean of the weights, where offsets of changing sign have cancelled.
+    Average,
 }
 
 /// Offsets a move makes, each on other looks.
-pub(crate) const STEPS: usize = 4;
+pub(crate) const STEPS: usize = 8;
 pub(crate) const GROUPS: [Group; 4] = [Group::Embedding, Group::Attention, Group::Linear, Group::All];
 pub(crate) const SIGNS: [Sign; 4] = [Sign::Similarity, Sign::Labels, Sign::Discrepancy, Sign::Confident];
-pub(crate) const UNITS: [f32; 3] = [1e-4, 3e-4, 1e-3];
+pub(crate) const UNITS: [f32; 4] = [3e-5, 1e-4, 3e-4, 1e-3];
+/// Moves that are not steps.
+const OTHERS: usize = 3;
 /// Number of moves.
-pub(crate) const MOVES: usize = GROUPS.len() * SIGNS.len() * UNITS.len() + 2;
+pub(crate) const MOVES: usize = GROUPS.len() * SIGNS.len() * UNITS.len() + OTHERS;
 /// Numbers that describe a move to the agent.
-pub(crate) const DESCRIPTION: usize = 3 + SIGNS.len() + UNITS.len() + 2;
+pub(crate) const DESCRIPTION: usize = 3 + SIGNS.len() + UNITS.len() + OTHERS;
 
 impl Move {
     /// Move of a number.
@@ -64,8 +68,9 @@ impl Move {
         match number {
             0 => Self::Refresh,
             1 => Self::Undo,
+            2 => Self::Average,
             n => {
-                let n = n - 2;
+                let n = n - OTHERS;
                 let (group, rest) = (n % GROUPS.len(), n / GROUPS.len());
                 Self::Step(GROUPS[group], SIGNS[rest % SIGNS.len()], UNITS[rest / SIGNS.len() % UNITS.len()])
             }
@@ -96,8 +101,9 @@ impl Move {
                     out[3 + SIGNS.len() + i] = f32::from(u8::from(*known == unit));
                 }
             }
-            Self::Refresh => out[DESCRIPTION - 2] = 1.0,
-            Self::Undo => out[DESCRIPTION - 1] = 1.0,
+            Self::Refresh => out[DESCRIPTION - 3] = 1.0,
+            Self::Undo => out[DESCRIPTION - 2] = 1.0,
+            Self::Average => out[DESCRIPTION - 1] = 1.0,
         }
         out
     }

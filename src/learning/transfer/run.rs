@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 use tandem_config::Product;
 
-use super::agent::{AGENT_FILE, Agent};
+use super::agent::{AGENT_FILE, Agent, Memory};
 use super::episode::{Bank, Episode};
 use super::protocol::{DATA_SEED, LABELS, Method, SOURCE, Settings, TEST, UNLABELLED, VALIDATION};
 use super::rivals::{Material, REFRESH, adapt};
@@ -30,6 +30,8 @@ const HELD: usize = 88;
 const SCHOOL: [usize; 2] = [LABELS, 128];
 /// Steps of the Q-network after each episode at school, and after the last.
 const LESSONS: [usize; 2] = [100, 1500];
+/// Episodes played side by side by the same agent.
+const CLASSMATES: usize = 2;
 /// Mixed into the seed of what is drawn at school: none of it is drawn again.
 const SCHOOL_SEED: u64 = 0x5c00_1000;
 
@@ -168,7 +170,7 @@ impl Ground {
                 adapt(method, settings, &mut student, &material, seed, &mut watch)?;
             }
             Method::Dqn | Method::Random | Method::Greedy => {
-                let mut episode = Episode::begin(student, &self.bank, sets, &[], settings, seed)?;
+                let mut episode = Episode::begin(student, (&self.bank, &self.source), sets, &[], settings, seed)?;
                 while !episode.over() {
                     match (method, agent) {
                         (Method::Greedy, _) => episode.make_best_of_some()?,
@@ -241,9 +243,9 @@ impl Ground {
         Ok(card)
     }
 
-    /// Lets an agent learn to choose, on `episodes` shifts of the source that are made up, a third of
-    /// them without labels, and writes it to `out`. `progress` hears episode, Δ_F of looks held back
-    /// at its beginning and end, and the Q-network's loss.
+    /// Lets an agent learn to choose, on `episodes` shifts of the source that are made up, a quarter of
+    /// them without labels, and writes it to `out`. `progress` hears episode, Δ_F of looks held back and the
+    /// mean probability of their own classes together, before and after, and the Q-network's loss.
     ///
     /// # Errors
     /// [`TrainError`]: the file cannot be written.
@@ -255,28 +257,52 @@ impl Ground {
         progress: &mut dyn FnMut(usize, [f32; 3]),
     ) -> Result<Agent, TrainError> {
         let mut agent = Agent::new(seed);
-        for number in 0..episodes {
-            let lot = SCHOOL_SEED + seed * 10_000 + number as u64;
-            let mut rng = ChaCha8Rng::seed_from_u64(lot);
-            let domain = Domain::made_up(&mut rng);
-            let labels = if number % 3 == 2 { 0 } else { SCHOOL[0] };
-            let [labelled, unlabelled] = draw(&domain, lot, labels, SCHOOL[1]);
-            let sets = Sets { labelled: &labelled, unlabelled: &unlabelled };
-            let held = examples(&domain, lot, Split::Validation, HELD, 1, &mut |_| ());
-            let settings = Settings::of(Method::Dqn);
-            let mut episode = Episode::begin(Student::load(&self.folder)?, &self.bank, sets, &held, settings, lot)?;
-            let first = episode.truth();
-            // Nothing but chance at first, one choice in ten of it after two thirds.
-            let exploration = (1.0 - 1.35 * number as f64 / episodes as f64).clamp(0.1, 1.0);
-            while !episode.over() {
-                episode.practise(&mut agent, exploration)?;
+        for first in (0..episodes).step_by(CLASSMATES) {
+            let numbers = first..episodes.min(first + CLASSMATES);
+            let played: Vec<Result<Played, TrainError>> = std::thread::scope(|scope| {
+                let agent = &agent;
+                // Nothing but chance at first, one choice in ten of it after two thirds.
+                let exploration = (1.0 - 1.35 * first as f64 / episodes as f64).clamp(0.1, 1.0);
+                let play = move |number| scope.spawn(move || self.play(number, seed, agent, exploration));
+                let players: Vec<_> = numbers.clone().map(play).collect();
+                let joined = players.into_iter().map(|player| player.join());
+                joined.map(|result| result.unwrap_or_else(|panic| std::panic::resume_unwind(panic))).collect()
+            });
+            for (number, played) in numbers.zip(played) {
+                let Played { memories, truth: [before, after] } = played?;
+                memories.into_iter().for_each(|memory| agent.remember(memory));
+                let loss = agent.learn(LESSONS[0]);
+                progress(number + 1, [before, after, loss]);
             }
-            let loss = agent.learn(LESSONS[0]);
-            progress(number + 1, [first, episode.truth(), loss]);
         }
         agent.learn(LESSONS[1]);
         std::fs::create_dir_all(out).map_err(|source| TrainError::File { file: out.to_owned(), source })?;
         agent.save(&out.join(AGENT_FILE))?;
         Ok(agent)
     }
+
+    /// One transfer to a shift that is made up, for what can be learned from it.
+    fn play(&self, number: usize, seed: u64, agent: &Agent, exploration: f64) -> Result<Played, TrainError> {
+        let lot = SCHOOL_SEED + seed * 10_000 + number as u64;
+        let domain = Domain::made_up(&mut ChaCha8Rng::seed_from_u64(lot));
+        let labels = if number % 4 == 3 { 0 } else { SCHOOL[0] };
+        let [labelled, unlabelled] = draw(&domain, lot, labels, SCHOOL[1]);
+        let sets = Sets { labelled: &labelled, unlabelled: &unlabelled };
+        let held = examples(&domain, lot, Split::Validation, HELD, 1, &mut |_| ());
+        let (student, settings) = (Student::load(&self.folder)?, Settings::of(Method::Dqn));
+        let mut episode = Episode::begin(student, (&self.bank, &self.source), sets, &held, settings, lot)?;
+        let before = episode.truth();
+        let mut memories = Vec::new();
+        while !episode.over() {
+            memories.push(episode.practise(agent, exploration)?);
+        }
+        Ok(Played { memories, truth: [before, episode.truth()] })
+    }
+}
+
+/// What came of a transfer at school.
+struct Played {
+    memories: Vec<Memory>,
+    /// Of the looks held back, before and after.
+    truth: [f32; 2],
 }

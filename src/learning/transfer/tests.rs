@@ -201,8 +201,9 @@ fn episodes_repeat_and_freeze_the_decoders() {
     let bank = Bank::new(&load(), &source).expect("plain tensors");
     let play = || {
         let mut episode =
-            Episode::begin(load(), &bank, sets, &[], Settings::of(Method::Dqn), 7).expect("plain tensors");
-        let numbers = [2 + 3, 2 + 7, 2 + 11, 2 + 15, 0];
+            Episode::begin(load(), (&bank, &source), sets, &[], Settings::of(Method::Dqn), 7).expect("plain tensors");
+        // All groups by each kind of sign, then the mean and the statistics.
+        let numbers = [3 + 3, 3 + 7, 3 + 11, 3 + 15, 2, 0];
         for number in numbers {
             episode.make(number).expect("plain tensors");
         }
