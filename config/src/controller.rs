@@ -27,6 +27,7 @@ const RISE: Bound = bound("via_rise_m", "m", 0.0, 1.0);
 const OFFSET: Bound = bound("via_offset_m", "m", 0.0, 1.0);
 const WORK: Bound = bound("planning_work", "samples", 1.0, 100.0);
 const SAMPLING: Bound = bound("sampling_looks_max", "looks", 0.0, 1e7);
+const RENEWAL: Bound = bound("renewal_period_ms", "ms", 0.0, 10_000.0);
 const SETTLE: Bound = bound("settle_ms", "ms", 0.0, 2000.0);
 const ACTION: Bound = bound("action_timeout_ms", "ms", 10.0, 600_000.0);
 const LOST: Bound = bound("part_lost_after_ms", "ms", 0.25, 10_000.0);
@@ -79,6 +80,7 @@ pub(crate) fn read(cell: &Table<'_>, timing: &Timing) -> Params {
         via_offset: number(&OFFSET, default.via_offset),
         planning_work: number(&WORK, f64::from(default.planning_work)) as u32,
         sampling_looks_max: number(&SAMPLING, f64::from(default.sampling_looks_max)) as u32,
+        renewal_period: time(&RENEWAL, default.renewal_period),
         settle: time(&SETTLE, default.settle),
         action_timeout: time(&ACTION, default.action_timeout),
         part_lost_after: time(&LOST, default.part_lost_after),

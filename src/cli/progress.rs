@@ -123,6 +123,10 @@ fn remark(kind: &EventKind) -> Option<String> {
         EventKind::Fallback { subtask, part, from, planner } => {
             format!("{part}: {subtask}: every {from} path is blocked; planned by {planner}")
         }
+        EventKind::WayChanged { subtask, part, reason, planner } => match *reason {
+            "blocked" => format!("{part}: {subtask}: something came into the way; round it, planned by {planner}"),
+            reason => format!("{part}: {subtask}: over to a {reason} way, planned by {planner}"),
+        },
         EventKind::Prompt { text, .. } => format!("to the person: {text}"),
         EventKind::Answer { answer, class, .. } if *answer != "done" && *answer != "started" => {
             format!("the person: {answer}{}", class.map(|class| format!(" ({class})")).unwrap_or_default())

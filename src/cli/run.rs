@@ -273,6 +273,7 @@ fn table(summary: &Summary, restarts: u32, wall_time_s: f64) -> Table {
         ("attempts failed", summary.steps_failed.to_string()),
         ("fallback plans", summary.fallbacks.to_string()),
         ("ways across", planned(&summary.planned)),
+        ("ways changed", summary.ways_changed.to_string()),
         ("protective stops", summary.stops.to_string()),
         ("contacts", summary.contacts.to_string()),
         ("restarted processes", restarts.to_string()),

@@ -1,7 +1,7 @@
 //! What a run tells about itself: one event a line in `--json`, and the final summary.
 
 use serde::Serialize;
-use tandem_msg::Planner;
+use tandem_msg::{Coded as _, Planner, Subtask};
 
 /// Something that happened, with the seconds since the run began on the cell's clock.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -147,6 +147,9 @@ pub enum EventKind {
         /// Who planned the motion.
         #[serde(skip_serializing_if = "Option::is_none")]
         planner: Option<&'static str>,
+        /// The subtasks whose policies led the arm across.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        policies: Vec<&'static str>,
     },
     /// A planner found no way, and the next one did.
     Fallback {
@@ -157,6 +160,17 @@ pub enum EventKind {
         /// Whose candidates were all blocked.
         from: &'static str,
         /// Who planned the motion.
+        planner: &'static str,
+    },
+    /// The arm went over to another way while it was moving.
+    WayChanged {
+        /// Subtask.
+        subtask: &'static str,
+        /// Part.
+        part: String,
+        /// What was wrong with the way it was on: blocked, or longer than the other one by far.
+        reason: &'static str,
+        /// Who planned the other one.
         planner: &'static str,
     },
     /// A person is asked for something.
@@ -350,6 +364,8 @@ pub struct Summary {
     pub steps_failed: u32,
     /// Motions that had to be planned by the next planner.
     pub fallbacks: u32,
+    /// Ways that were changed for another one in motion.
+    pub ways_changed: u32,
     /// Finished motions, by who planned the way across.
     pub planned: Planned,
     /// Protective stops.
@@ -375,11 +391,35 @@ pub struct Planned {
     pub rrt_connect: u32,
     /// By nobody: straight on, or straight back.
     pub straight: u32,
+    /// Motions in which the policy of each subtask had a part.
+    pub led_by: LedBy,
+}
+
+/// Motions by the policies that led the arm across; two may share one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LedBy {
+    /// To a part or a tool.
+    pub grasp: u32,
+    /// With a part across the cell.
+    pub transfer: u32,
+    /// With a part around the box to its place.
+    pub place: u32,
+    /// With a part or a tool to where it is joined.
+    pub assemble: u32,
 }
 
 impl Planned {
-    /// Counts one.
-    pub(super) fn count(&mut self, planner: Planner) {
+    /// Counts one, and the policies that led it.
+    pub(super) fn count(&mut self, planner: Planner, led_by: u32) {
+        let LedBy { grasp, transfer, place, assemble } = &mut self.led_by;
+        for (subtask, count) in [
+            (Subtask::Grasp, grasp),
+            (Subtask::Transfer, transfer),
+            (Subtask::Place, place),
+            (Subtask::Assemble, assemble),
+        ] {
+            *count += u32::from(led(led_by, subtask));
+        }
         match planner {
             Planner::Policy => self.policy += 1,
             Planner::Manual => self.manual += 1,
@@ -394,6 +434,11 @@ impl Planned {
         let across = self.policy + self.manual + self.rrt_connect;
         (across > 0).then(|| f64::from(self.policy) / f64::from(across))
     }
+}
+
+/// Whether the policy of a subtask is among those of a motion.
+pub(super) fn led(led_by: u32, subtask: Subtask) -> bool {
+    led_by >> subtask.code() & 1 == 1
 }
 
 /// Seconds or metres with the digits a reader can use.
@@ -414,14 +459,15 @@ mod tests {
                 part: "fuse".into(),
                 duration_s: 3.25,
                 clearance_min_m: Some(0.031),
-                planner: Some("manual"),
+                planner: Some("policy"),
+                policies: vec!["grasp"],
             },
             time_s: 12.5,
         };
         assert_eq!(
             serde_json::to_string(&event).ok().as_deref(),
             Some(
-                r#"{"event":"action_done","subject":"robot","subtask":"grasp","part":"fuse","duration_s":3.25,"clearance_min_m":0.031,"planner":"manual","time_s":12.5}"#
+                r#"{"event":"action_done","subject":"robot","subtask":"grasp","part":"fuse","duration_s":3.25,"clearance_min_m":0.031,"planner":"policy","policies":["grasp"],"time_s":12.5}"#
             )
         );
     }

@@ -90,6 +90,8 @@ pub struct Supervisor {
     caution: Option<Caution>,
     /// A person had to look at the motion under way after a stop.
     inspected: bool,
+    /// Ways changed in motion, as the controller counted when last heard.
+    changes: u32,
     summary: Summary,
 }
 
@@ -103,6 +105,7 @@ impl Supervisor {
             steps_done: 0,
             steps_failed: 0,
             fallbacks: 0,
+            ways_changed: 0,
             planned: Planned::default(),
             stops: 0,
             contacts: 0,
@@ -134,6 +137,7 @@ impl Supervisor {
             roles: RoleWatch::default(),
             caution: None,
             inspected: false,
+            changes: 0,
             summary,
         }
     }

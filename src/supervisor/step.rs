@@ -24,6 +24,8 @@ pub(super) struct Current {
     pub(super) clearance_min: f64,
     /// Who planned the motion.
     pub(super) planner: Planner,
+    /// Policies that led the arm across, a bit for the number of each one's subtask.
+    pub(super) led_by: u32,
 }
 
 impl Current {
@@ -35,6 +37,7 @@ impl Current {
             acted: false,
             clearance_min: f64::INFINITY,
             planner: Planner::None,
+            led_by: 0,
         }
     }
 
@@ -44,6 +47,7 @@ impl Current {
         if motion.clearance_min.is_finite() {
             self.clearance_min = self.clearance_min.min(motion.clearance_min);
         }
+        self.led_by |= motion.led_by;
         // A motion that is planned anew counts for the last planner that was needed.
         let rank = |planner: Planner| match planner {
             Planner::None => 0,

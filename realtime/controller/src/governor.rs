@@ -116,6 +116,11 @@ impl Governor {
         self.level = 0;
         self.stood_since = None;
         self.patience = if with_person { HAND_OVER_PATIENCE } else { Duration::ZERO };
+        self.change_over(limits)
+    }
+
+    /// Goes over to another path in motion, at the level in force.
+    pub(crate) fn change_over(&mut self, limits: &LawLimits) -> Result<(), Refused> {
         self.acceleration = limits.acceleration;
         self.jerk = limits.jerk;
         for ((stop, speed), share) in self.stops.iter_mut().zip(&mut self.speeds).zip(LEVELS) {
@@ -161,6 +166,18 @@ impl Governor {
         let kept = self.params.reserve + self.params.hysteresis;
         let horizon = self.owed_standing(&halt, age, sigma, f64::NEG_INFINITY) + rate * halt.way + kept;
         if horizon.is_finite() { horizon } else { FAR }
+    }
+
+    /// Separation at which an arm on the present path passes somebody at the speed of a level, and does not wait for
+    /// them, metres.
+    pub(crate) fn passes_at(&self, level: usize, (age, sigma): (f64, f64)) -> f64 {
+        let halt = self.halt_from(level.clamp(1, LEVELS.len()) - 1, 0.0);
+        self.owed_standing(&halt, age, sigma, f64::NEG_INFINITY) + self.params.reserve
+    }
+
+    /// The reserve kept beyond what is owed, metres.
+    pub(crate) fn reserve(&self) -> f64 {
+        self.params.reserve
     }
 
     /// Separation owed, beyond what the arm comes nearer, to a body part measured to close in at a speed.

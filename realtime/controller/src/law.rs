@@ -124,6 +124,23 @@ impl Law {
         self.time >= self.trajectory.duration()
     }
 
+    /// Its state some seconds from now, if nothing changes it.
+    pub(crate) fn after(&self, seconds: f64) -> State {
+        if self.finished() { self.state } else { self.trajectory.at(self.time + seconds)[0] }
+    }
+
+    /// Its state some seconds from now, if it goes over to slower limits at once.
+    pub(crate) fn slowed_after(&self, seconds: f64, length: f64, slower: &LawLimits) -> Result<State, Refused> {
+        let input = Input::<1> {
+            start: [self.state],
+            target: [State::at_rest(length)],
+            limits: [slower.symmetric()],
+            soft_limits: [true],
+            ..Input::default()
+        };
+        Ok(Trajectory::calculate(&input).map_err(|_| Refused)?.at(seconds)[0])
+    }
+
     /// The law one period on.
     pub(crate) fn advanced(&self, period: f64) -> Self {
         let time = self.time + period;

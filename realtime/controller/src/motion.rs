@@ -155,6 +155,14 @@ impl Motion {
         Ok(())
     }
 
+    /// Goes over to another path that goes on from the present one, from a state of the law on it.
+    pub(crate) fn change_over(&mut self, path: &Path, limits: &LawLimits, state: State) -> Result<(), Refused> {
+        let law = Law::to(path.length(), state, limits)?;
+        (self.path, self.limits) = (*path, *limits);
+        self.mode = Mode::Following { law };
+        Ok(())
+    }
+
     /// Leaves the path; only at standstill.
     pub(crate) fn rest(&mut self) {
         self.set.velocity = [0.0; JOINTS_MAX];

@@ -59,6 +59,9 @@ pub struct Params {
     /// Looks at the scene that the sampling planner may take for a motion when no hand-designed path is
     /// clear; it takes eight in the time of a sample. 0 = it is not asked.
     pub sampling_looks_max: u32,
+    /// Time from one look for a better way to the next while the arm follows one across; 0 = it keeps to what was
+    /// planned at rest.
+    pub renewal_period: Duration,
     /// Time at rest before the tool acts, for the arm to settle.
     pub settle: Duration,
     /// How long the tool may take for an action.
@@ -156,6 +159,7 @@ impl Default for Params {
             via_offset: 0.25,
             planning_work: 4,
             sampling_looks_max: 300_000,
+            renewal_period: Duration::from_millis(100),
             settle: Duration::from_millis(30),
             action_timeout: Duration::from_secs(20),
             part_lost_after: Duration::from_millis(100),
@@ -250,6 +254,7 @@ impl Params {
         value("via_offset", self.via_offset, 0.0, 1.0, "m");
         value("planning_work", f64::from(self.planning_work), 1.0, 100.0, "samples");
         value("sampling_looks_max", f64::from(self.sampling_looks_max), 0.0, 1e7, "looks");
+        value("renewal_period", ms(self.renewal_period), 0.0, 10_000.0, "ms");
         value("settle", ms(self.settle), 0.0, 2_000.0, "ms");
         value("action_timeout", ms(self.action_timeout), 10.0, 600_000.0, "ms");
         value("part_lost_after", ms(self.part_lost_after), ms(self.period), 10_000.0, "ms");

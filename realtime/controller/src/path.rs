@@ -17,6 +17,13 @@ use crate::law::LawLimits;
 
 /// Joint positions a path has room for.
 pub(crate) const NODES_MAX: usize = 33;
+/// Control points of a path that is drawn by them instead.
+pub(crate) const CONTROLS: usize = NODES_MAX + 2;
+
+/// Shares of a joint's limit that a bent path may take for the terms `q'' u²`, `q''' u³` and `3 q'' u a`.
+const BEND: f64 = 0.4;
+const TWIST: f64 = 0.2;
+const CROSS: f64 = 0.4;
 
 /// Where the joints are at a length, and their derivatives by it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -61,6 +68,34 @@ impl Path {
         path
     }
 
+    /// The cubic B-spline with these control points, each node of it between three of them.
+    pub(crate) fn spline(controls: &[Joints; CONTROLS], length: f64) -> Self {
+        let mut path = Self { length, count: NODES_MAX, ..Self::point(&controls[0]) };
+        let h = path.spacing();
+        for (i, three) in controls.windows(3).enumerate() {
+            for joint in 0..JOINTS_MAX {
+                let (before, at, after) = (three[0][joint], three[1][joint], three[2][joint]);
+                path.nodes[i][joint] = (before + 4.0 * at + after) / 6.0;
+                path.curvature[i][joint] = (before - 2.0 * at + after) / (h * h);
+            }
+        }
+        path
+    }
+
+    /// Sets the control points that decide how a path of that length begins, so that it goes on from a point of another
+    /// one: position and both derivatives are the same. Says how many they are.
+    pub(crate) fn begin_as(controls: &mut [Joints; CONTROLS], point: &PathPoint, length: f64) -> usize {
+        let h = length / (NODES_MAX - 1) as f64;
+        for joint in 0..JOINTS_MAX {
+            let (slope, bend) = (h * point.first[joint], h * h * point.second[joint]);
+            let at = point.position[joint] - bend / 6.0;
+            controls[0][joint] = at - slope + 0.5 * bend;
+            controls[1][joint] = at;
+            controls[2][joint] = at + slope + 0.5 * bend;
+        }
+        3
+    }
+
     /// Solves for the second derivatives of one joint; end slopes by one-sided differences of fourth order.
     fn bend(&mut self, joint: usize) {
         let last = self.count - 1;
@@ -103,6 +138,11 @@ impl Path {
         &self.nodes[self.count.clamp(2, NODES_MAX) - 1]
     }
 
+    /// Joint positions along it.
+    pub(crate) fn nodes(&self) -> &[Joints] {
+        &self.nodes[..self.count.clamp(2, NODES_MAX)]
+    }
+
     fn spacing(&self) -> f64 {
         self.length / (self.count - 1) as f64
     }
@@ -128,28 +168,40 @@ impl Path {
         point
     }
 
-    /// Largest absolute first, second and third derivative of one joint over the whole path.
-    fn peaks(&self, joint: usize) -> [f64; 3] {
-        let mut peaks = [0.0_f64; 3];
+    /// Largest absolute first, second and third derivative of one joint between two nodes.
+    fn peaks(&self, piece: usize, joint: usize) -> [f64; 3] {
         if self.length <= 0.0 {
-            return peaks;
+            return [0.0; 3];
         }
         let h = self.spacing();
-        for i in 0..self.count - 1 {
-            let (m0, m1) = (self.curvature[i][joint], self.curvature[i + 1][joint]);
-            let mean = (self.nodes[i + 1][joint] - self.nodes[i][joint]) / h;
-            let slope = |b: f64| {
-                let a = 1.0 - b;
-                mean + ((3.0 * b * b - 1.0) * m1 - (3.0 * a * a - 1.0) * m0) * h / 6.0
-            };
-            peaks[0] = peaks[0].max(slope(0.0).abs()).max(slope(1.0).abs());
-            if m0 * m1 < 0.0 {
-                peaks[0] = peaks[0].max(slope(m0 / (m0 - m1)).abs());
-            }
-            peaks[1] = peaks[1].max(m0.abs()).max(m1.abs());
-            peaks[2] = peaks[2].max((m1 - m0).abs() / h);
+        let (m0, m1) = (self.curvature[piece][joint], self.curvature[piece + 1][joint]);
+        let mean = (self.nodes[piece + 1][joint] - self.nodes[piece][joint]) / h;
+        let slope = |b: f64| {
+            let a = 1.0 - b;
+            mean + ((3.0 * b * b - 1.0) * m1 - (3.0 * a * a - 1.0) * m0) * h / 6.0
+        };
+        let mut first = slope(0.0).abs().max(slope(1.0).abs());
+        if m0 * m1 < 0.0 {
+            first = first.max(slope(m0 / (m0 - m1)).abs());
         }
-        peaks
+        [first, m0.abs().max(m1.abs()), (m1 - m0).abs() / h]
+    }
+
+    /// Pieces between nodes.
+    fn pieces(&self) -> usize {
+        self.count.clamp(2, NODES_MAX) - 1
+    }
+
+    /// Seconds per length that a piece takes at least when the law neither speeds up nor slows down.
+    pub(crate) fn slowness(&self, chain: &Chain, piece: usize) -> f64 {
+        let mut slow = [0.0_f64; 3];
+        for (index, joint) in chain.joints().iter().enumerate() {
+            let [first, second, third] = self.peaks(piece, index);
+            slow[0] = slow[0].max(first / joint.velocity_max);
+            slow[1] = slow[1].max(second / (BEND * joint.acceleration_max));
+            slow[2] = slow[2].max(third / (TWIST * joint.jerk_max));
+        }
+        slow[0].max(slow[1].sqrt()).max(slow[2].cbrt())
     }
 
     /// Limits of the law along this path under which every joint keeps its own.
@@ -159,58 +211,69 @@ impl Path {
     /// on a straight one the law gets them whole. `speed` scales velocities only, so that an arm
     /// that is told to be slow still stops as hard as it can.
     ///
-    /// `tcp_speed_max` (m/s) caps the TCP's speed, sampled at nine places with a tenth to spare.
+    /// `tcp_speed_max` (m/s) caps the TCP's speed, sampled with a tenth to spare.
     pub(crate) fn limits(&self, chain: &Chain, speed: f64, tcp_speed_max: f64) -> LawLimits {
-        /// Shares of the joint's limit for the terms `q'' u²`, `q''' u³` and `3 q'' u a`.
-        const BEND: f64 = 0.4;
-        const TWIST: f64 = 0.2;
-        const CROSS: f64 = 0.4;
-        let mut limits = LawLimits { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
         const FLAT: f64 = 1e-9;
-        for (index, joint) in chain.joints().iter().enumerate() {
-            let [first, second, third] = self.peaks(index);
-            if first > FLAT {
-                limits.velocity = limits.velocity.min(speed * joint.velocity_max / first);
-            }
-            if second > FLAT {
-                limits.velocity = limits.velocity.min((BEND * joint.acceleration_max / second).sqrt());
-            }
-            if third > FLAT {
-                limits.velocity = limits.velocity.min((TWIST * joint.jerk_max / third).cbrt());
+        let joints = chain.joints();
+        let mut limits = LawLimits { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
+        for piece in 0..self.pieces() {
+            for (index, joint) in joints.iter().enumerate() {
+                let [first, second, third] = self.peaks(piece, index);
+                if first > FLAT {
+                    limits.velocity = limits.velocity.min(speed * joint.velocity_max / first);
+                }
+                if second > FLAT {
+                    limits.velocity = limits.velocity.min((BEND * joint.acceleration_max / second).sqrt());
+                }
+                if third > FLAT {
+                    limits.velocity = limits.velocity.min((TWIST * joint.jerk_max / third).cbrt());
+                }
             }
         }
         limits.velocity = limits.velocity.min(speed * tcp_speed_max / (1.1 * self.tcp_rate(chain)).max(FLAT));
         let u = limits.velocity;
-        for (index, joint) in chain.joints().iter().enumerate() {
-            let [first, second, third] = self.peaks(index);
-            if first <= FLAT {
-                continue;
+        for piece in 0..self.pieces() {
+            for (index, joint) in joints.iter().enumerate() {
+                let [first, second, _] = self.peaks(piece, index);
+                if first > FLAT {
+                    limits.acceleration = limits.acceleration.min((joint.acceleration_max - second * u * u) / first);
+                }
+                if second > FLAT {
+                    limits.acceleration = limits.acceleration.min(CROSS * joint.jerk_max / (3.0 * second * u));
+                }
             }
-            limits.acceleration = limits.acceleration.min((joint.acceleration_max - second * u * u) / first);
-            if second > FLAT {
-                limits.acceleration = limits.acceleration.min(CROSS * joint.jerk_max / (3.0 * second * u));
+        }
+        for piece in 0..self.pieces() {
+            for (index, joint) in joints.iter().enumerate() {
+                let [first, second, third] = self.peaks(piece, index);
+                if first > FLAT {
+                    let bent = third * u * u * u + 3.0 * second * u * limits.acceleration;
+                    limits.jerk = limits.jerk.min((joint.jerk_max - bent) / first);
+                }
             }
-            let cross = if second > FLAT { 3.0 * second * u * limits.acceleration } else { 0.0 };
-            limits.jerk = limits.jerk.min((joint.jerk_max - third * u * u * u - cross) / first);
         }
         limits
     }
 
-    /// Largest travel of the TCP per length, at nine places.
+    /// Travel of the TCP per length.
+    pub(crate) fn tcp_travel(&self, chain: &Chain, length: f64) -> f64 {
+        let point = self.at(length);
+        let poses = chain.forward(&point.position);
+        let tcp = poses.base_from_tcp.translation.vector;
+        chain.point_velocity(&poses, poses.count, &tcp, &point.first).norm()
+    }
+
+    /// Largest travel of the TCP per length: at the nodes, or nine places.
     pub(crate) fn tcp_rate(&self, chain: &Chain) -> f64 {
-        let mut largest = 0.0_f64;
-        for k in 0..=8 {
-            let point = self.at(self.length * f64::from(k) / 8.0);
-            let poses = chain.forward(&point.position);
-            let tcp = poses.base_from_tcp.translation.vector;
-            largest = largest.max(chain.point_velocity(&poses, poses.count, &tcp, &point.first).norm());
-        }
-        largest
+        let places = self.pieces().max(8);
+        (0..=places)
+            .fold(0.0, |largest: f64, k| largest.max(self.tcp_travel(chain, self.length * k as f64 / places as f64)))
     }
 
     /// Bound on how far any point of the arm travels per length: `sum of reach_j max|q_j'|`.
     pub(crate) fn sweep_rate(&self, reach: &Joints) -> f64 {
-        reach.iter().enumerate().map(|(joint, reach)| reach * self.peaks(joint)[0]).sum()
+        let fastest = |joint| (0..self.pieces()).fold(0.0, |most: f64, piece| most.max(self.peaks(piece, joint)[0]));
+        reach.iter().enumerate().map(|(joint, reach)| reach * fastest(joint)).sum()
     }
 }
 
@@ -236,6 +299,38 @@ mod tests {
         }
     }
 
+    /// A path drawn by control points goes on from a point of another one without a step in position, slope or bend, and
+    /// ends where it should.
+    #[test]
+    fn a_spline_goes_on_from_another_path() {
+        let mut nodes = [[0.0; JOINTS_MAX]; NODES_MAX];
+        for (i, node) in nodes.iter_mut().enumerate() {
+            *node = core::array::from_fn(|joint| (i as f64 * 0.1 * (1.0 + joint as f64)).sin());
+        }
+        let first = Path::through(&nodes, NODES_MAX, 1.5);
+        for k in 0..20 {
+            let left = first.at(1.5 * f64::from(k) / 20.0);
+            let mut controls = [[0.0; JOINTS_MAX]; CONTROLS];
+            for (i, control) in controls.iter_mut().enumerate() {
+                *control = core::array::from_fn(|joint| (i * joint) as f64 * 0.01);
+            }
+            Path::begin_as(&mut controls, &left, 0.9);
+            let second = Path::spline(&controls, 0.9);
+            let joined = second.at(0.0);
+            for joint in 0..JOINTS_MAX {
+                assert!((joined.position[joint] - left.position[joint]).abs() < 1e-12);
+                assert!((joined.first[joint] - left.first[joint]).abs() < 1e-9);
+                assert!((joined.second[joint] - left.second[joint]).abs() < 1e-7);
+            }
+            let step = 1e-6;
+            let (a, b) = (second.at(0.4), second.at(0.4 + step));
+            for joint in 0..JOINTS_MAX {
+                assert!(((b.position[joint] - a.position[joint]) / step - a.first[joint]).abs() < 1e-4);
+                assert!(((b.first[joint] - a.first[joint]) / step - a.second[joint]).abs() < 1e-2);
+            }
+        }
+    }
+
     /// The derivatives are those of the position, and the peaks bound them.
     #[test]
     fn derivatives_agree_with_differences() {
@@ -254,7 +349,8 @@ mod tests {
                 let second = (after.first[joint] - before.first[joint]) / (2.0 * step);
                 assert!((first - here.first[joint]).abs() < 1e-6);
                 assert!((second - here.second[joint]).abs() < 1e-2 * (1.0 + second.abs()));
-                let peaks = path.peaks(joint);
+                let piece = ((s * (NODES_MAX - 1) as f64) as usize).min(NODES_MAX - 2);
+                let peaks = path.peaks(piece, joint);
                 assert!(here.first[joint].abs() <= peaks[0] + 1e-12);
                 assert!(here.second[joint].abs() <= peaks[1] + 1e-12);
             }

@@ -4,7 +4,7 @@
 
 mod cell;
 
-use cell::{BENCH, BOX_WALL, Cell, down, task};
+use cell::{BENCH, BOX_WALL, Cell, down, put, task};
 use proptest::prelude::*;
 use tandem_msg::*;
 
@@ -56,13 +56,7 @@ fn a_part_is_taken_carried_and_seated() {
         mass: 0.5,
         ..AttachedPart::default()
     };
-    cell.scene.objects[cell.scene.object_count as usize] = SceneObject {
-        id: PART,
-        shape: Code::of(ShapeKind::Box),
-        size: [0.05, 0.04, 0.01],
-        base_from_object: Pose { position: [0.35, -0.55, 0.05], ..Pose::IDENTITY },
-    };
-    cell.scene.object_count += 1;
+    put(&mut cell, PART, [0.35, -0.55, 0.05], [0.05, 0.04, 0.01]);
     let mut grasp = task(1, down(0.35, -0.55, 0.055, 0.0));
     grasp.subtask = Code::of(Subtask::Grasp);
     grasp.retract = 0.12;
@@ -75,7 +69,7 @@ fn a_part_is_taken_carried_and_seated() {
 
     // The part is no object of the scene any more.
     cell.scene.object_count -= 1;
-    cell.scene.version = 2;
+    cell.scene.version += 1;
     let carried =
         |id, goal| MotionTask { attached_before: part, attached_after: part, scene_version: 2, ..task(id, goal) };
     let hover = down(0.62, 0.0, 0.17, 0.0);
@@ -176,14 +170,7 @@ fn failures_are_named() {
 fn a_blocked_way_is_gone_around() {
     let mut cell = Cell::new();
     assert_eq!(cell.perform(task(1, down(0.35, -0.55, 0.15, 0.0))), MotionPhase::Done);
-    cell.scene.objects[cell.scene.object_count as usize] = SceneObject {
-        id: 50,
-        shape: Code::of(ShapeKind::Box),
-        size: [0.4, 0.02, 0.25],
-        base_from_object: Pose { position: [0.65, -0.28, 0.25], ..Pose::IDENTITY },
-    };
-    cell.scene.object_count += 1;
-    cell.scene.version = 2;
+    put(&mut cell, 50, [0.65, -0.28, 0.25], [0.4, 0.02, 0.25]);
     let goal = down(0.62, 0.1, 0.25, 0.0);
     assert_eq!(
         cell.perform(MotionTask { scene_version: 2, ..task(2, goal) }),
@@ -278,14 +265,7 @@ fn a_scene_that_changes_ahead_is_planned_around() {
     cell.until("on the way across", 5_000, |cell| {
         cell.phase() == MotionPhase::Transfer && cell.tcp().translation.y > -0.40
     });
-    cell.scene.objects[cell.scene.object_count as usize] = SceneObject {
-        id: 50,
-        shape: Code::of(ShapeKind::Box),
-        size: [0.10, 0.02, 0.15],
-        base_from_object: Pose { position: [0.85, 0.25, 0.15], ..Pose::IDENTITY },
-    };
-    cell.scene.object_count += 1;
-    cell.scene.version = 2;
+    put(&mut cell, 50, [0.85, 0.25, 0.15], [0.10, 0.02, 0.15]);
     cell.until("done", 20_000, |cell| cell.phase() == MotionPhase::Done);
     assert_at(&cell, &goal);
     assert_eq!(cell.status().stop_count, 0);

@@ -41,8 +41,11 @@ fn towards(gain: f32, bias: f32) -> Stored {
 }
 
 fn cell_with(policy: Stored) -> Cell {
+    cell_of(Policies { transfer: Some(policy), ..Policies::default() })
+}
+
+fn cell_of(policies: Policies) -> Cell {
     let mut cell = Cell::new();
-    let policies = Policies { transfer: Some(policy), ..Policies::default() };
     cell.controller = Controller::new(ur10(), Monitor::new(body()), params()).expect("the parameters pass");
     cell.controller.set_policies(policies);
     cell
@@ -83,4 +86,20 @@ fn where_the_policy_fails_the_next_planner_moves_the_arm() {
     assert_eq!(cell.perform(grasp), MotionPhase::Done);
     assert_eq!(cell.status().planner.get(), Some(Planner::Manual));
     cell.assert_limits();
+}
+
+/// Near its goal a transfer is led by the policy that places; where that one leads nowhere, by its own to the end.
+#[test]
+fn the_policy_that_places_leads_the_end_of_a_transfer() {
+    let led_by = |gain: f32| {
+        let (transfer, place) = (Some(towards(3.0, 0.0)), Some(towards(gain, 0.0)));
+        let mut cell = cell_of(Policies { transfer, place, ..Policies::default() });
+        assert_eq!(cell.perform(task(1, down(0.45, -0.60, 0.25, 0.0))), MotionPhase::Done);
+        cell.give(task(2, down(0.55, 0.45, 0.35, 0.0)));
+        cell.until("on the way", 5_000, |cell| cell.status().task_id == 2 && cell.phase() == MotionPhase::Transfer);
+        assert_eq!(cell.status().planner.get(), Some(Planner::Policy));
+        cell.status().led_by
+    };
+    let [transfer, place] = [Subtask::Transfer, Subtask::Place].map(|subtask| 1 << subtask.code());
+    assert_eq!([led_by(3.0), led_by(-1.0)], [transfer | place, transfer]);
 }

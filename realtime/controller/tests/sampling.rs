@@ -3,7 +3,7 @@
 
 mod cell;
 
-use cell::{Cell, down, params, task};
+use cell::{Cell, down, params, put, task};
 use tandem_controller::Params;
 use tandem_cycle::guard::{CountingAllocator, counted};
 use tandem_msg::*;
@@ -16,14 +16,7 @@ fn walled(params: Params) -> Cell {
     let mut cell = Cell::with(params);
     assert_eq!(cell.perform(task(1, down(0.45, -0.60, 0.15, 0.0))), MotionPhase::Done);
     assert_eq!(cell.status().planner.get(), Some(Planner::Manual));
-    cell.scene.objects[cell.scene.object_count as usize] = SceneObject {
-        id: 50,
-        shape: Code::of(ShapeKind::Box),
-        size: [0.55, 0.02, 0.42],
-        base_from_object: Pose { position: [0.85, -0.25, 0.42], ..Pose::IDENTITY },
-    };
-    cell.scene.object_count += 1;
-    cell.scene.version = 2;
+    put(&mut cell, 50, [0.85, -0.25, 0.42], [0.55, 0.02, 0.42]);
     cell
 }
 

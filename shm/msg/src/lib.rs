@@ -29,8 +29,8 @@ pub use geometry::{Capsule, Pose, SceneObject, ShapeKind};
 pub use header::{Freshness, Header, Message, Stamp, Suspect};
 pub use sensing::{BodyPart, Feature, FeatureClass, FeatureDimensions, HumanState, Measured, PointCloud, Recognition};
 pub use task::{
-    AttachedPart, MotionFailure, MotionPhase, MotionStatus, MotionTask, Planner, RunMode, SafetyMode, Scene,
-    StopCategory, StopCause, StopState, Subtask,
+    AttachedPart, ChangeReason, MotionFailure, MotionPhase, MotionStatus, MotionTask, Planner, RunMode, SafetyMode,
+    Scene, StopCategory, StopCause, StopState, Subtask,
 };
 
 /// Joints a message has room for; arms of up to this many joints are accepted.

@@ -160,6 +160,18 @@ coded! {
 }
 
 coded! {
+    /// Why the arm went over to another way while it was moving.
+    pub enum ChangeReason {
+        /// It did not.
+        None = 0, "none";
+        /// Something had come into the one it followed.
+        Blocked = 1, "blocked";
+        /// The other one was clearly shorter.
+        Shorter = 2, "shorter";
+    }
+}
+
+coded! {
     /// Which limits the arm moves under.
     pub enum SafetyMode {
         /// Those of its files.
@@ -257,8 +269,12 @@ pub struct MotionStatus {
     pub reset_seen: u32,
     /// Limits in force.
     pub mode: Code<SafetyMode>,
-    /// Zero; keeps the layout free of padding.
-    pub reserved: u32,
+    /// Ways that were changed for another in motion, since start.
+    pub changes: u32,
+    /// Why the last one was; who planned the other is `planner`.
+    pub change_reason: Code<ChangeReason>,
+    /// Policies that led the arm across, where they planned it: a bit for the number of each one's subtask.
+    pub led_by: u32,
     /// Arm link (index) and scene object (id; 0 = the arm itself, 1000 + k = capsule k of the person) that are nearest.
     pub nearest: [u32; 2],
     /// Clearance now: smallest distance from arm or carried part to anything it must not touch, metres.
@@ -285,7 +301,7 @@ pub struct MotionStatus {
     /// Where the TCP is, by the measured joints.
     pub base_from_tcp: Pose,
 }
-message!(MotionStatus, 224);
+message!(MotionStatus, 232);
 
 /// Everything fixed or placed that the arm must not touch, supervisor to controller.
 #[derive(Clone, Copy, Debug)]

@@ -1,7 +1,7 @@
 //! Carrying out a strategy's actions, and what follows when one fails.
 
 use super::super::actions::{Means, Operation, release};
-use super::super::event::{EventKind, Outcome, rounded};
+use super::super::event::{EventKind, Outcome, led, rounded};
 use super::super::step::Current;
 use super::super::{SupervisorInputs, SupervisorOutputs};
 use super::{Phase, Supervisor};
@@ -9,8 +9,8 @@ use crate::strategy::StepState;
 use std::time::Duration;
 use tandem_config::{Form, Verb};
 use tandem_msg::{
-    Answer, Code, Coded, EffectorAction, MotionFailure, MotionPhase, MotionTask, Planner, Pose, PromptKind, RunMode,
-    StopState, Subtask, Tool,
+    Answer, ChangeReason, Code, Coded, EffectorAction, MotionFailure, MotionPhase, MotionTask, Planner, Pose,
+    PromptKind, RunMode, StopState, Subtask, Tool,
 };
 
 impl Supervisor {
@@ -34,11 +34,24 @@ impl Supervisor {
             let (part, planner) = (self.part().name.clone(), current.planner.name());
             self.say(out, EventKind::Fallback { subtask, part, from: from.name(), planner });
         }
+        if inputs.motion.task_id == self.task.id && inputs.motion.changes > self.changes {
+            self.way_changed(&current, inputs, out);
+        }
+        self.changes = inputs.motion.changes;
         match result {
             Progress::Going => self.work.current = Some(current),
             Progress::Done => self.operation_done(&current, out),
             Progress::Failed { reason, again } => self.failed(reason, again, inputs, out),
         }
+    }
+
+    fn way_changed(&mut self, current: &Current, inputs: &SupervisorInputs<'_>, out: &mut SupervisorOutputs) {
+        let reason = inputs.motion.change_reason.get().unwrap_or(ChangeReason::None).name();
+        let planner = inputs.motion.planner.get().unwrap_or(Planner::None).name();
+        self.summary.ways_changed += 1;
+        let (_, subtask) = current.operation.names();
+        let part = self.part().name.clone();
+        self.say(out, EventKind::WayChanged { subtask, part, reason, planner });
     }
 
     /// The planner that should have found the way of a motion, where the next one had to.
@@ -191,7 +204,7 @@ impl Supervisor {
             self.summary.min_clearance_m = Some(least);
         }
         let moved = matches!(current.operation, Operation::Motion(_));
-        self.summary.planned.count(current.planner);
+        self.summary.planned.count(current.planner, current.led_by);
         self.inspected &= !moved;
         self.say(
             out,
@@ -202,6 +215,11 @@ impl Supervisor {
                 duration_s: rounded(current.began.age_at(self.now).as_secs_f64()),
                 clearance_min_m: clearance,
                 planner: moved.then(|| current.planner.name()),
+                policies: Subtask::ALL
+                    .iter()
+                    .filter(|subtask| led(current.led_by, **subtask))
+                    .map(|subtask| subtask.name())
+                    .collect(),
             },
         );
         if matches!(&current.operation, Operation::Motion(task) if task.action.is(EffectorAction::Grasp)) {

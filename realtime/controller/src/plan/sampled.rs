@@ -6,10 +6,11 @@
 
 use tandem_clearance::Monitor;
 use tandem_kinematics::Chain;
-use tandem_msg::{MotionFailure, MotionPhase, Planner as PlannedBy};
+use tandem_msg::{MotionFailure, Planner as PlannedBy};
 use tandem_planner::{Planner, Progress, Request};
 
-use super::{DEPARTS, LEGS_MAX, Search, Step, Tools};
+use super::search::{LEGS_MAX, Search, Step};
+use super::{DEPARTS, Leg, Tools};
 use crate::path::Path;
 use crate::{Joints, Params};
 
@@ -79,11 +80,11 @@ impl Sampled {
     }
 
     /// Begins to search. The monitor must hold the part, and allow no contact.
-    pub(super) fn begin(&mut self, chain: &Chain, monitor: &Monitor, params: &Params, seed: u64) {
+    pub(super) fn begin(&mut self, chain: &Chain, monitor: &Monitor, params: &Params, looks_max: u32, seed: u64) {
         let request = Request {
             margin: (params.path_margin - RESOLUTION).max(params.clearance_min),
             resolution: RESOLUTION,
-            looks_max: params.sampling_looks_max,
+            looks_max,
             seed,
         };
         let (starts, goals) = (&self.starts[..self.start_count], &self.goals[..self.goal_count]);
@@ -118,7 +119,8 @@ impl Search {
             return Step::Failed(MotionFailure::NoClearPath);
         }
         tools.monitor.set_touch(&[0; 16]);
-        self.sampled.begin(tools.chain, tools.monitor, tools.params, self.goal.seed);
+        let looks_max = tools.params.sampling_looks_max;
+        self.sampled.begin(tools.chain, tools.monitor, tools.params, looks_max, self.goal.seed);
         Step::Sample
     }
 
@@ -146,7 +148,7 @@ impl Search {
         for index in 0..across {
             let [from, to] = [index, index + 1].map(|k| self.sampled.path()[k]);
             let path = Path::line(&from, &to);
-            self.legs[first + index] = self.leg(tools, &path, MotionPhase::Transfer, [0; 16], tools.params.path_margin);
+            self.legs[first + index] = Leg::across(&self.goal, tools, &path);
         }
         self.count = first + across;
         self.finish()

@@ -11,10 +11,16 @@ use crate::law::{Law, Refused};
 use crate::motion::SetPoint;
 use crate::stop::{Causes, Seen};
 
+/// An arm that is about to turn off from a blocked path goes on until it would have to stop within this time, s, or
+/// length.
+const TURNING: f64 = 0.02;
+const NEAR: f64 = 0.002;
+
 impl Controller {
     /// Makes the next set-point, checks it, and sends it or the stop that was checked before it.
     pub(super) fn follow(&mut self, now: Stamp, go: bool, heard: &Heard, reset_count: u32, mut causes: Causes) {
         self.motion.slow(self.period);
+        self.change_over(now, go);
         let mut next = None;
         let mut choice = 0;
         if let Some(law) = self.motion.law() {
@@ -143,7 +149,10 @@ impl Controller {
             causes.add(StopCause::Separation);
         }
         let level = self.governor.choose(now, self.guard.people(), &halt);
-        if known && !self.guard.blocked() { level } else { 0 }
+        // What is blocked is followed only to turn off from it, as long as there is room to stop a little later.
+        let room = self.guard.clear_to() - stop.end;
+        let turns_off = self.towards.is_some() && room > TURNING * state.velocity + NEAR;
+        if known && (!self.guard.blocked() || turns_off) { level } else { 0 }
     }
 
     /// What is wrong with sending a set-point after the last one.
@@ -153,13 +162,13 @@ impl Controller {
     }
 
     /// Age (s) and standard deviation (m) of what is known of people.
-    fn known_of_people(&self, now: Stamp) -> (f64, f64) {
-        (self.watch.human_age(now), self.human_sigma)
+    pub(super) fn known_of_people(&self, now: Stamp) -> (f64, f64) {
+        (self.watch.human_age(now), self.human.position_sigma)
     }
 
     /// Share of the path's speed in force.
     pub(super) fn share(&self) -> f64 {
-        Governor::share(self.law_level).min(self.pace.share_max())
+        Governor::share(self.law_level).min(self.pace.share_max()).min(self.share_before_change())
     }
 
     /// Whether a joint is farther outside its range at `then` than at `now`.

@@ -2,14 +2,15 @@
 
 mod follow;
 mod recover;
+mod renew;
 mod task;
 
 use nalgebra::Vector3;
 use tandem_clearance::Monitor;
 use tandem_kinematics::Chain;
 use tandem_msg::{
-    Code, HumanState, JOINTS_MAX, JointCommand, JointState, MotionPhase, MotionStatus, MotionTask, Planner, PlantFault,
-    RunMode, Scene, Stamp, StopCategory, StopCause, StopState,
+    ChangeReason, Code, HumanState, JOINTS_MAX, JointCommand, JointState, MotionPhase, MotionStatus, MotionTask,
+    Planner, PlantFault, RunMode, Scene, Stamp, StopCategory, StopCause, StopState,
 };
 
 use crate::black_box::{BlackBox, Record, StopRecord};
@@ -20,7 +21,7 @@ use crate::inputs::{Heard, Watch, arm_follows, run_mode};
 use crate::job::{Job, Stage, pose};
 use crate::motion::Motion;
 use crate::pace::Pace;
-use crate::plan::Search;
+use crate::plan::{Outlook, Search};
 use crate::reach::Reach;
 use crate::stop::{Causes, StopMonitor};
 use crate::{Params, ParamsError};
@@ -59,7 +60,7 @@ pub struct Controller {
 
     watch: Watch,
     arm: JointState,
-    human_sigma: f64,
+    human: HumanState,
     scene_key: Option<(u64, u64)>,
     scene_valid: bool,
     plan_is_current: bool,
@@ -69,9 +70,15 @@ pub struct Controller {
     effector: Effector,
     // What is large lies on the heap, since a controller is moved about until it runs.
     search: Box<Search>,
-    planner: Box<Monitor>,
+    outlook: Box<Outlook>,
     policies: Policies,
     surroundings: Surroundings,
+    /// When a better way was looked for last, and how often one was taken.
+    renewed_at: Stamp,
+    /// The way in hand is blocked, another one is being looked for, and meanwhile the arm goes on at this share of its speed.
+    towards: Option<f64>,
+    changes: u32,
+    change_reason: ChangeReason,
     motion: Motion,
     guard: Box<Guard>,
     governor: Governor,
@@ -90,6 +97,21 @@ pub struct Controller {
     base_from_tcp: tandem_msg::Pose,
     black_box: BlackBox,
 }
+
+/// What planning works with: all that the controller has, and the outlook's monitor of `scene` or of a scene `peopled`.
+macro_rules! tools {
+    ($controller:ident, $outlook:ident) => {
+        $crate::plan::Tools {
+            chain: &$controller.chain,
+            params: &$controller.params,
+            reach: &$controller.reach,
+            monitor: $controller.outlook.$outlook(),
+            policies: &$controller.policies,
+            surroundings: &$controller.surroundings,
+        }
+    };
+}
+use tools;
 
 impl Controller {
     /// A controller of an arm, at rest and with nothing heard. What stands for the arm's shape is its capsules,
@@ -111,7 +133,7 @@ impl Controller {
             period: params.period.as_secs_f64(),
             watch: Watch::default(),
             arm: JointState::default(),
-            human_sigma: 0.0,
+            human: HumanState::default(),
             scene_key: None,
             scene_valid: false,
             plan_is_current: false,
@@ -119,9 +141,13 @@ impl Controller {
             job: Job::none(),
             effector: Effector::default(),
             search: Box::new(Search::new()),
-            planner: Box::new(arm.clone()),
+            outlook: Box::new(Outlook::new(arm.clone())),
             policies: Policies::default(),
             surroundings: Surroundings::default(),
+            renewed_at: Stamp(0),
+            towards: None,
+            changes: 0,
+            change_reason: ChangeReason::None,
             motion: Motion::new(&chain),
             guard: Box::new(Guard::new(&chain, arm, params.clearance_min)),
             governor: Governor::new(&params.separation),
@@ -172,6 +198,7 @@ impl Controller {
             && !replaced
             && self.job.abandon.is_none();
         self.advance_task(now, go, heard.arm.good);
+        self.renew(now, go);
         self.pace.update(now, run == RunMode::Reduced, self.guard.people().nearest.distance, &self.params);
         self.follow(now, go, &heard, inputs.task.reset_count, causes);
         self.job.clearance_min = self.job.clearance_min.min(self.guard.clearance().distance);
@@ -220,7 +247,7 @@ impl Controller {
             self.guard.set_human(inputs.human);
             let count = (inputs.human.capsule_count as usize).min(inputs.human.capsules.len());
             self.surroundings.set_person(&inputs.human.capsules[..count]);
-            self.human_sigma = inputs.human.position_sigma;
+            self.human = *inputs.human;
             self.black_box.see(inputs.human);
         }
         if heard.scene.good {
@@ -228,11 +255,13 @@ impl Controller {
             if self.scene_key != Some(key) {
                 self.scene_key = Some(key);
                 self.plan_is_current = false;
+                self.drop_renewal();
+                self.renewed_at = Stamp(0);
                 self.surroundings.set_scene(inputs.scene.objects());
                 self.scene_valid = match self.params.workspace.enclose(inputs.scene) {
                     Some((objects, count)) => {
                         let guarded = self.guard.set_scene(&objects[..count]);
-                        guarded && self.planner.set_scene(&objects[..count]).is_ok()
+                        guarded && self.outlook.set_scene(&objects[..count])
                     }
                     None => false,
                 };
@@ -362,7 +391,9 @@ impl Controller {
             stop_count: self.stop.count(),
             reset_seen: self.stop.reset_seen(),
             mode: Code::of(self.pace.mode()),
-            reserved: 0,
+            changes: self.changes,
+            change_reason: Code::of(self.change_reason),
+            led_by: if planned { self.search.led_by() } else { 0 },
             nearest,
             clearance: clearance.distance,
             clearance_min: self.job.clearance_min,

@@ -2,11 +2,11 @@
 
 use tandem_msg::{MotionFailure, MotionTask, Stamp};
 
-use super::Controller;
+use super::{Controller, tools};
 use crate::effector::Answer;
 use crate::inputs::{Heard, task_is_valid};
 use crate::job::Stage;
-use crate::plan::{Goal, Leg, Progress, Tools};
+use crate::plan::{Goal, Leg, Progress};
 
 impl Controller {
     /// Takes a new task once the arm is at rest.
@@ -105,14 +105,7 @@ impl Controller {
             self.job.stage = Stage::Planning { begun: true };
             self.plan_is_current = true;
         }
-        let mut tools = Tools {
-            chain: &self.chain,
-            params: &self.params,
-            reach: &self.reach,
-            monitor: &mut self.planner,
-            policies: &self.policies,
-            surroundings: &self.surroundings,
-        };
+        let mut tools = tools!(self, scene);
         match self.search.work(&mut tools) {
             Progress::Searching => {}
             Progress::Failed(failure) => {

@@ -102,6 +102,14 @@ pub fn scene() -> Scene {
     scene
 }
 
+/// Puts a box into the scene of a cell, which is another version then.
+pub fn put(cell: &mut Cell, id: u32, centre: [f64; 3], half: [f64; 3]) {
+    cell.scene.objects[cell.scene.object_count as usize] = object(id, centre, half);
+    cell.scene.object_count += 1;
+    cell.scene.version += 1;
+    cell.referee.set_scene(cell.scene.objects()).expect("the scene is sound");
+}
+
 /// Tool pointing down at a place, turned about the vertical.
 pub fn down(x: f64, y: f64, z: f64, turn: f64) -> Pose {
     let rotation = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), turn)
@@ -400,6 +408,11 @@ impl Cell {
             cell.status().task_id == id && matches!(cell.phase(), MotionPhase::Done | MotionPhase::Failed)
         });
         self.phase()
+    }
+
+    /// Clearance of the position commanded last.
+    pub fn referee_clearance(&self) -> f64 {
+        self.referee.clearance(&self.chain.forward(&self.outputs.command.position)).distance
     }
 
     /// Every joint kept its limits in every command so far.
