@@ -72,12 +72,10 @@ impl Path {
     pub(crate) fn spline(controls: &[Joints; CONTROLS], length: f64) -> Self {
         let mut path = Self { length, count: NODES_MAX, ..Self::point(&controls[0]) };
         let h = path.spacing();
-        for (i, three) in controls.windows(3).enumerate() {
-            for joint in 0..JOINTS_MAX {
-                let (before, at, after) = (three[0][joint], three[1][joint], three[2][joint]);
-                path.nodes[i][joint] = (before + 4.0 * at + after) / 6.0;
-                path.curvature[i][joint] = (before - 2.0 * at + after) / (h * h);
-            }
+        for ((node, curvature), three) in path.nodes.iter_mut().zip(&mut path.curvature).zip(controls.windows(3)) {
+            let [before, at, after] = [0, 1, 2].map(|k| three[k]);
+            *node = core::array::from_fn(|joint| (before[joint] + 4.0 * at[joint] + after[joint]) / 6.0);
+            *curvature = core::array::from_fn(|joint| (before[joint] - 2.0 * at[joint] + after[joint]) / (h * h));
         }
         path
     }
@@ -86,13 +84,13 @@ impl Path {
     /// one: position and both derivatives are the same. Says how many they are.
     pub(crate) fn begin_as(controls: &mut [Joints; CONTROLS], point: &PathPoint, length: f64) -> usize {
         let h = length / (NODES_MAX - 1) as f64;
-        for joint in 0..JOINTS_MAX {
-            let (slope, bend) = (h * point.first[joint], h * h * point.second[joint]);
-            let at = point.position[joint] - bend / 6.0;
-            controls[0][joint] = at - slope + 0.5 * bend;
-            controls[1][joint] = at;
-            controls[2][joint] = at + slope + 0.5 * bend;
-        }
+        let around = |slopes: f64| -> Joints {
+            core::array::from_fn(|joint| {
+                let (slope, bend) = (h * point.first[joint], h * h * point.second[joint]);
+                point.position[joint] - bend / 6.0 + slopes * slope + slopes * slopes * 0.5 * bend
+            })
+        };
+        (controls[0], controls[1], controls[2]) = (around(-1.0), around(0.0), around(1.0));
         3
     }
 

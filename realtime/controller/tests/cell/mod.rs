@@ -410,11 +410,6 @@ impl Cell {
         self.phase()
     }
 
-    /// Clearance of the position commanded last.
-    pub fn referee_clearance(&self) -> f64 {
-        self.referee.clearance(&self.chain.forward(&self.outputs.command.position)).distance
-    }
-
     /// Every joint kept its limits in every command so far.
     pub fn assert_limits(&self) {
         let found = &self.findings;
