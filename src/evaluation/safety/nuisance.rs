@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use tandem_clearance::Monitor;
+use tandem_controller::Params;
 use tandem_msg::{
     Capsule, Code, Header, HumanState, MotionTask, RunMode, Scene, SceneObject, ShapeKind, Stamp, Subtask,
 };
@@ -64,10 +65,11 @@ pub fn passers_by(arm: &Arm, seed: u64, cycles: u64) -> [u64; 4] {
 }
 
 /// Somebody walks straight at a slow long motion, at this speed, until they stand at the arm: how often the arm
-/// changes between moving and waiting, or between being stopped and not.
+/// changes between moving and waiting, or between being stopped and not. It keeps to its way: one that goes round
+/// somebody may stand to turn off, which is no wavering.
 pub fn crossing(arm: &Arm, seed: u64, speed: f64) -> u32 {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let params = arm.hasty();
+    let params = Params { renewal_period: std::time::Duration::ZERO, ..arm.hasty() };
     let header = Header { seq: 0, stamp: Stamp(0), epoch: 1, config_hash: params.config_hash };
     let mut tracking = Tracking::new(Fault::None, SIGMA, ChaCha8Rng::seed_from_u64(seed ^ 0x7ac4), header);
     let mut referee = Referee::new(Monitor::new(arm.body));
