@@ -52,6 +52,11 @@ fn the_monitor_is_no_nuisance() {
     assert!(needless * 20 <= cycles, "{needless} of {cycles}");
     let free = withdrawal(&arm, Behind::Nothing);
     for behind in [Behind::Obstacle, Behind::Hand] {
-        assert_eq!(withdrawal(&arm, behind), free, "{behind:?}");
+        let with = withdrawal(&arm, behind);
+        // Another way may be taken, none that is slower.
+        assert!(
+            with.iter().zip(free).all(|(with, free)| (with - free).abs() < 1e-3 * free),
+            "{behind:?}: {with:?}, {free:?}"
+        );
     }
 }
