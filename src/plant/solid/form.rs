@@ -92,7 +92,7 @@ pub enum Hook {
     },
 }
 
-/// Forms of [`FeatureClass::Other`].
+/// Forms of [`tandem_msg::FeatureClass::Other`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Other {
     /// The bare surface.
